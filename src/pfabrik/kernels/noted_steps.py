@@ -151,14 +151,13 @@ def put_partials(operation: int, a: Floats, b: Floats, value: Floats, n: int, x:
 
 
 @routine
-def put_slopes(
-    x: Floats, X: Floats, x0: int, x1: int, y: Floats, Y: Floats, y0: int, y1: int, n: int, out: Floats
-) -> None:
+def put_slopes(hull: Ints, x: Floats, X: Floats, y: Floats, Y: Floats, n: int, out: Floats) -> None:
     """Fill the slopes of a step at n rows from its derivatives x and y by two operands, whose slopes are X and Y.
 
-    The slopes of a number are a row of n for each column; an operand has slopes in its columns from x0 to x1, or from
-    y0 to y1, if any.
+    The slopes of a number are a row of n for each column; which columns the operands have is in the step's hull, as in
+    `evaluate`.
     """
+    x0, x1, y0, y1 = hull[2], hull[3], hull[4], hull[5]
     if y0 == y1 or (x0 == y0 and x1 == y1):
         for column in range(x0, x1):
             own, other, to = X[n * column :], Y[n * column :], out[n * column :]
@@ -235,7 +234,7 @@ def evaluate(
             if n_columns > 0 and hull[0] < hull[1]:
                 put_partials(operation, V[a * n :], V[b * n :], V[to * n :], n, P, P[width:])
                 x, y = (b, c) if operation == CHOOSE else (a, b)
-                put_slopes(P, D[x * m :], hull[2], hull[3], P[width:], D[y * m :], hull[4], hull[5], n, D[to * m :])
+                put_slopes(hull, P, D[x * m :], P[width:], D[y * m :], n, D[to * m :])
         for r in range(outputs.shape[0]):
             at, first, last = outputs[r, 0], outputs[r, 1], outputs[r, 2]
             for i in range(n):
