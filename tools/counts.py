@@ -50,7 +50,7 @@ IDEAS = {
     "records that hold an answer": (
         "kernels.rows.Rows kernels.pose.search_records.PoseSolutions kernels.joints.joint_tables.Answered "
         "engines.pose.single.Answers kernels.pose.search_records.Starts kernels.pose.tables.Start "
-        "engines.pose.single.AssemblyOutputs kernels.pose.equations.PlatformState kernels.joints.loops.Closed "
+        "kernels.pose.equations.PlatformState kernels.joints.loops.Closed "
         "engines.joints.close.Closing engines.joints.configurations.Configurations engines.pose.answers.LegAnswers "
         "answers.solution.Solution"
     ),

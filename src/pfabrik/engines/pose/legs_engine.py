@@ -345,18 +345,20 @@ class LegsEngine(Engine):
         self, values: Floats, start: Configurations | None, tolerance: float, *, keep_mode: bool = True
     ) -> Configurations:
         """The configurations at actuated values (n, n_a), from one start or one for each."""
-        start_sides, outputs = self._sides_of(start), None
+        start_sides, given = self._sides_of(start), None
         if len(values) == 1:
-            rows, solution = outputs = self._single.new_rows(), self._assembly.new_outputs(1)
+            rows = self._single.new_rows()
             rows.actuators[:] = values
+            ends = self._assembly.new_ends(rows)
             own = self._forward_start(start, start_sides)
-            is_solved = self._assembly.prepared(own, rows, solution, self._assembly.scratch)() == 0
-            if is_solved and not (self._keeps_apart and mark_near(self._model, rows, solution.sides)):
-                return leg_answers(self._model, rows, solution.sides, solution.q, start, start_sides)
+            is_solved = self._assembly.prepared(own, rows, ends, self._assembly.scratch)() == 0
+            if is_solved and not (self._keeps_apart and mark_near(self._model, rows, ends.sides)):
+                return leg_answers(self._model, rows, ends.sides, ends.q, start, start_sides)
+            given = rows, ends
         nearby = start is not None and keep_mode
         request = request_from(self._model, Options(), start, start_sides, keep_mode, nearby, tolerance)
         starts = self._forward_start(start, start_sides).record
-        rows, q_proximal, sides = forward_kinematics(request, values, starts, outputs)
+        rows, q_proximal, sides = forward_kinematics(request, values, starts, given)
         projected = np.flatnonzero(rows.status == PROJECTED)
         if len(projected) and not keep_mode:  # seeds are few where one freedom goes all round
             begin = start if start is None or len(start) == 1 else start.at(projected)
@@ -374,7 +376,7 @@ class LegsEngine(Engine):
             return None
         start_handle = self._forward_start(start, self._sides_of(start))
         scratch = Handle(new_scratch(self._model))
-        call = self._assembly.prepared(start_handle, rows, self._assembly.new_outputs(1), scratch)
+        call = self._assembly.prepared(start_handle, rows, self._assembly.new_ends(rows), scratch)
         return call, (start_handle, scratch)
 
     def _forward_start(self, start: Configurations | None, sides: Floats) -> Handle[Starts]:

@@ -201,14 +201,6 @@ class SingleTarget:
         return self._blocks(self._resting_table.address, target, self.home, resting.table.home_sides, *_outputs(rows))
 
 
-class AssemblyOutputs(NamedTuple):
-    """Outputs of assembly: actuators, proximal coordinates and sides, as of `Starts`."""
-
-    values: Floats  # (n, n_a): deviations from home [L or rad]
-    q: Floats  # (n, legs)
-    sides: Floats  # (n, legs)
-
-
 class LegsAssembly:
     """Forward kinematics of a machine from starts, for one row or many, prepared likewise."""
 
@@ -218,33 +210,33 @@ class LegsAssembly:
 
         self.home, self.scratch = Handle(home_start(model)), Scratch(new_scratch, model)
         self._legs, self._places = search_table(model.legs), places_of_rods(model)
-        self._n_actuators, self._n_legs = len(model.mechanism.actuator_names), len(model.legs.legs)
+        self._n_legs = len(model.legs.legs)
         self._kernels: tuple[Callable[..., int], ...] = assemble, assemble_in_blocks
 
-    def new_outputs(self, n: int) -> AssemblyOutputs:
-        """Allocate the outputs of n rows."""
-        n_legs = self._n_legs
-        return AssemblyOutputs(np.zeros((n, self._n_actuators)), np.zeros((n, n_legs)), np.zeros((n, n_legs)))
+    def new_ends(self, rows: Rows) -> Starts:
+        """Allocate the configurations of rows, with their poses [length]."""
+        shape = len(rows.poses), self._n_legs
+        return Starts(rows.poses, np.zeros(shape), np.zeros(shape))
 
     def prepared(
         self,
         starts: Handle[Starts],
         rows: Rows,
-        outputs: AssemblyOutputs,
+        ends: Starts,
         scratch: Handle[NewtonScratch] | Scratch[NewtonScratch],
     ) -> Callable[[], int]:
         """A call that assembles rows at `rows.actuators`, from one start each or one for all; 0 if all are assembled.
 
-        It is valid while starts, scratch memory and this object are kept. Six rods are assembled in blocks, of one row
-        too, so that a row has the same digits alone and in a batch.
+        Ends are those of `new_ends`. The call is valid while starts, scratch memory and this object are kept. Six rods
+        are assembled in blocks, of one row too, so that a row has the same digits alone and in a batch.
         """
         legs, given, places = self._legs.address, (rows.actuators, starts.address), self._places
         assemble, assemble_in_blocks = self._kernels
-        ends = rows.status, outputs.values, Starts(rows.poses, outputs.q, outputs.sides), rows.measures
-        others = partial(assemble, legs, scratch.address, *given, places is not None, *ends)
+        outputs = rows.status, np.zeros(rows.actuators.shape), ends, rows.measures
+        others = partial(assemble, legs, scratch.address, *given, places is not None, *outputs)
         if places is None:
             return others
-        in_blocks = partial(assemble_in_blocks, legs, places, *given, *ends)
+        in_blocks = partial(assemble_in_blocks, legs, places, *given, *outputs)
         return lambda: in_blocks() and others()
 
 
