@@ -11,6 +11,7 @@ from pathlib import Path
 
 NEEDED = ("matplotlib", "scipy")
 PAGE = Path(__file__).parents[1] / "docs" / "reproduction.md"
+FIRST_PAGE = Path(__file__).parents[1] / "README.md"
 
 
 def main(line: list[str] | None = None) -> int:
@@ -31,7 +32,8 @@ def main(line: list[str] | None = None) -> int:
         nargs="?",
         const=PAGE,
         metavar="FILE",
-        help="put the summary between the two marks of a file (docs/reproduction.md where none is named)",
+        help="put the tables between the two marks of a file; where none is named of docs/reproduction.md, and some "
+        "lines into README.md",
     )
     given = parser.parse_args(line)
     missing = [name for name in NEEDED if find_spec(name) is None]
@@ -53,7 +55,9 @@ def reproduce(out: Path, quick: bool, page: Path | None) -> int:
         for path in sorted(Path(part).iterdir()):
             path.replace(out / path.name)
     if page is not None:
-        report.put_into(page, report.summary(findings))
+        report.put_into(page, report.page_tables(findings))
+        if page == PAGE:
+            report.put_into(FIRST_PAGE, report.lines_of_summary(findings))
     promises = report.promises(findings)
     for promise in promises:
         sys.stdout.write(f"{'holds' if promise.holds else 'FAILS'}  {promise.text}: {promise.measured}\n")

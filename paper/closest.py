@@ -1,20 +1,16 @@
-"""The feasible pose nearest to a target, by exact projection and by a general optimiser: what the paper's projection
-is measured against.
-"""
+"""The feasible pose nearest to a target, by a general optimiser: what projections are measured against."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize
 
-from pfabrik import Solution, Status, Track
+from pfabrik import Track
 
-from .arrays import Floats
+from .arrays import Floats, Mask
 from .feasible import Model, model_of
 from .study import Tick
-from .tolerances import POSITION, ROTATION
+from .tolerances import POSITION
 
 FEASIBLE = 1e-8
 """How far the optimiser may exceed a limit or open a loop and still count [L or rad]."""
@@ -26,49 +22,25 @@ SPREAD = 0.3
 """How far positions of random starts are from the answer's [L]."""
 
 
-class Comparison(NamedTuple):
-    """One projected step, and how far from its target poses of the target's orientation are [length].
+def nearest_distances(default: Track, targets: Floats, beyond: Mask, searches: int, tick: Tick) -> Floats:
+    """Distance from targets beyond reach to the nearest feasible pose of their orientation that the optimiser finds.
 
-    Attributes
+    Parameters
     ----------
-    distance : of the answer.
-    exact : of the answer by exact projection; NaN if it gives up the orientation.
-    accelerated : the same of the projection by half-spaces.
-    searched : of the nearest feasible pose that the optimiser finds; NaN if it finds none.
+    default : the answers by default, from which the optimiser starts among others.
+    searches : how many are searched at most, evenly spread.
+
+    Returns
+    -------
+    array (n,) [length]; NaN where nothing is searched, or found.
     """
-
-    step: int
-    distance: float
-    exact: float
-    accelerated: float
-    searched: float
-
-    @property
-    def nearest(self) -> float:
-        """Distance of the nearest feasible pose found in either way."""
-        return float(np.fmin(self.exact, self.searched))
-
-
-def compare(
-    targets: Floats, solution: Track, exact: Solution, accelerated: Solution, searches: int, tick: Tick
-) -> list[Comparison]:
-    """Projected answers, in three ways, next to the nearest feasible poses of the same orientation.
-
-    Left out are answers that gave up the target's orientation.
-    """
-    held = (np.asarray(solution.status) == Status.PROJECTED) & (solution.rotation_error <= ROTATION)
-    steps = np.flatnonzero(held)
+    steps = np.flatnonzero(beyond)
     steps = steps[np.unique(np.linspace(0, len(steps) - 1, min(searches, len(steps))).astype(int))]
-    nearest, by_half_spaces = (
-        np.where(each.rotation_error <= ROTATION, each.position_error, np.nan) for each in (exact, accelerated)
-    )
-    model, found = model_of(solution.mechanism), []
-    for step, x in zip(steps.tolist(), model.variables(solution[steps]), strict=True):
-        searched = nearest_distance(model, targets[step], x)
-        distance, exactly = float(solution.position_error[step]), float(nearest[step])
-        found.append(Comparison(step, distance, exactly, float(by_half_spaces[step]), searched))
+    model, distances = model_of(default.mechanism), np.full(len(targets), np.nan)
+    for step, x in zip(steps.tolist(), model.variables(default[steps]), strict=True):
+        distances[step] = nearest_distance(model, targets[step], x)
         tick()
-    return found
+    return distances
 
 
 def nearest_distance(model: Model, target: Floats, start: Floats) -> float:

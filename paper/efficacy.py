@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pfabrik import Options, Solution, Status, solve_fk
+from pfabrik import Options, Solution, Status, passes, solve_fk
 
 from .arrays import Floats
 from .checking import Feasibility, feasibility
@@ -23,13 +23,13 @@ class Followed:
     solution : what `track` answered, n steps.
     position_errors, orientation_errors : of the poses that Newton's method finds from the actuators of each step,
         begun at the step before, against the targets, (n,) [length], [deg].
-    newton : iterations it took on average.
+    by_fallback : steps that passes did not answer.
     """
 
     solution: Solution
     position_errors: Floats
     orientation_errors: Floats
-    newton: float
+    by_fallback: int
     feasibility: Feasibility
 
     @property
@@ -68,7 +68,7 @@ def go_around(case: Case, targets: Floats, options: Options) -> Followed:
         solution=solution,
         position_errors=np.linalg.norm(poses[:, :3, 3] - targets[:, :3, 3], axis=1),
         orientation_errors=np.degrees(angles_between(poses[:, :3, :3], targets[:, :3, :3])),
-        newton=float(np.mean(np.append(start.iterations, rest.iterations))),
+        by_fallback=int(np.sum(passes.by_fallback(solution))),
         feasibility=feasibility(solution),
     )
 
@@ -94,7 +94,7 @@ def summary(found: Efficacy) -> list[dict[str, Any]]:
             "position_rmse": run.position_rmse,
             "orientation_rmse_deg": None if is_point(found.case) else run.orientation_rmse,
             "iterations": float(np.mean(run.solution.iterations)),
-            "newton_iterations": run.newton,
+            "by_fallback": run.by_fallback,
             **run.feasibility._asdict(),
         }
         for name, run in found.runs.items()

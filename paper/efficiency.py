@@ -20,8 +20,8 @@ from .timing import median_times, one_core
 
 DRAWN_AT_ONCE = 4096
 MOST_DRAWN = 2_000_000
-COPIES = 10
-"""How often the targets are repeated in a batch that is timed, so that one call's overhead does not count."""
+COPIES = {"default": 10, "geometric": 10}
+"""How often the targets are repeated in a batch that takes microseconds a target, so that the call does not count."""
 
 NEVER = 1e-300
 """A tolerance that is never met [length, rad]."""
@@ -40,6 +40,11 @@ class Answered:
     @property
     def reached(self) -> int:
         return int(np.count_nonzero(self._are_reached))
+
+    @property
+    def by_fallback(self) -> int:
+        """Targets that passes did not answer."""
+        return int(np.sum(passes.by_fallback(self.solution)))
 
     @property
     def position_rms(self) -> float:
@@ -63,8 +68,8 @@ class Efficiency:
     Attributes
     ----------
     targets : (n, 4, 4), in the workspace by the closed form; each the nearest one left to the one before.
-    answers : by options ("paper", "accelerated", "default") and start ("cold": home, "warm": the answer to the target
-        before).
+    answers : by options ("paper", "extended", "accelerated", "default") and start ("cold": home, "warm": the answer to
+        the target before).
     agreement : largest difference of an actuator from the closed form's, cold, default options [length or rad]; None
         for redundant mechanisms, where both may be right.
     times : of one target [s], by what was timed: (options or "geometric", start, "batch", "call" or "single").
@@ -80,11 +85,15 @@ class Efficiency:
 
     def ratio(self, start: str) -> float:
         """Time of a target of a batch by default over that of the geometric approach, from the same start."""
-        return self.times["default", start, "batch"] / self.times["geometric", start, "batch"]
+        return self.times["default", start, "batch"] / self.geometric_time(start, "batch")
 
     def ratio_of_passes(self, start: str) -> float:
         """Time of the passes that a target takes over that of the geometric approach for a target alone."""
-        return self.answers["paper", start].iterations * self.pass_time / self.times["geometric", start, "single"]
+        return self.answers["paper", start].iterations * self.pass_time / self.geometric_time(start, "single")
+
+    def geometric_time(self, start: str, how: str) -> float:
+        """Time of a target by the geometric approach [s]; NaN where it is not compiled."""
+        return self.times.get(("geometric", start, how), float("nan"))
 
 
 def run(case: Case, extent: Extent, tick: Tick) -> Efficiency:
@@ -155,30 +164,41 @@ def timed(
 ) -> dict[tuple[str, str, str], float]:
     """Median time of one target [s], on one core, each way by turns.
 
+    Where closed forms are not compiled, nothing is timed by them.
     "batch": its share of one call for all targets, many times over. "call": a call of its own from Python, by
     default of a prepared `Solver`. "single": a call of its own from compiled code, of the geometric approach alone.
     """
     calls: dict[tuple[str, str, str], Callable[[], object]] = {}
-    many, after = np.tile(targets, (COPIES, 1, 1)), np.tile(targets[1:], (COPIES, 1, 1))
-    first = np.tile(np.arange(len(targets) - 1), COPIES)
+    n = len(targets)
+    rows = {name: (np.tile(np.arange(n), copies), np.tile(np.arange(n - 1), copies)) for name, copies in COPIES.items()}
     for name, options in ANY_MODE.items():
-        before = answers[name, "cold"].solution[first]
+        every, first = rows.get(name, (np.arange(n), np.arange(n - 1)))
+        many, after, before = targets[every], targets[first + 1], answers[name, "cold"].solution[first]
         calls[name, "cold", "batch"] = partial(solve, mechanism, many, options)
         calls[name, "warm", "batch"] = partial(solve, mechanism, after, options, before)
         is_default = not isinstance(options, passes.Options)
         one = Solver(mechanism, options=options).ik if is_default else partial(solve, mechanism, options=options)
         calls[name, "cold", "call"] = partial(ask_one_by_one, one, targets)
     closed = partial(geometric.solve_ik, mechanism)
-    calls["geometric", "cold", "batch"] = partial(closed, many)
-    calls["geometric", "warm", "batch"] = partial(closed, after, start=closed(targets[first]))
+    if not geometric.IS_COMPILED:
+        return _a_target(calls, repeats, len(targets))
+    every, first = rows["geometric"]
+    calls["geometric", "cold", "batch"] = partial(closed, targets[every])
+    calls["geometric", "warm", "batch"] = partial(closed, targets[first + 1], start=closed(targets[first]))
     calls["geometric", "cold", "call"] = partial(ask_one_by_one, closed, targets)
     calls["geometric", "cold", "single"] = geometric.one_by_one(mechanism, targets)
     calls["geometric", "warm", "single"] = geometric.one_by_one(mechanism, targets[1:], closed(targets[:-1]))
-    counts = {"batch": {"cold": len(many), "warm": len(after)}}
-    alone = {"cold": len(targets), "warm": len(targets) - 1}
+    return _a_target(calls, repeats, len(targets))
+
+
+def _a_target(
+    calls: dict[tuple[str, str, str], Callable[[], object]], repeats: int, n: int
+) -> dict[tuple[str, str, str], float]:
+    """Median time of each call over the targets that it answers [s]."""
     with one_core():
         seconds = median_times(calls, repeats)
-    return {key: seconds[key] / counts.get(key[2], alone)[key[1]] for key in calls}
+    counts = {key: n - (key[1] == "warm") for key in calls}
+    return {key: seconds[key] / (counts[key] * (COPIES.get(key[0], 1) if key[2] == "batch" else 1)) for key in calls}
 
 
 def ask_one_by_one(answer: Callable[[Floats], object], targets: Floats) -> None:
@@ -214,6 +234,7 @@ def summary(found: Efficiency) -> list[dict[str, Any]]:
             "reached": answered.reached,
             "position_rms": answered.position_rms,
             "iterations": answered.iterations,
+            "by_fallback": answered.by_fallback,
             "iterations_most": int(np.max(answered.solution.iterations)),
             "agreement": found.agreement if (options, start) == ("default", "cold") else None,
             **answered.feasibility._asdict(),
@@ -231,7 +252,7 @@ def time_rows(found: Efficiency) -> list[dict[str, Any]]:
             "start": start,
             "how": how,
             "microseconds": 1e6 * seconds,
-            "ratio_to_geometric": seconds / found.times["geometric", start, how],
+            "ratio_to_geometric": seconds / found.geometric_time(start, how),
         }
         for (method, start, how), seconds in found.times.items()
     ] + [
@@ -241,6 +262,6 @@ def time_rows(found: Efficiency) -> list[dict[str, Any]]:
             "start": "",
             "how": "pass",
             "microseconds": 1e6 * found.pass_time,
-            "ratio_to_geometric": found.pass_time / found.times["geometric", "cold", "single"],
+            "ratio_to_geometric": found.pass_time / found.geometric_time("cold", "single"),
         }
     ]

@@ -5,21 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from . import efficacy, efficiency, robustness
+from . import efficacy, efficiency, forward, robustness
 from .efficacy import Efficacy
 from .efficiency import Efficiency
+from .forward import Forward
 from .robustness import Robustness
 from .study import FULL, QUICK, Case, Extent, cases
 
 
 @dataclass(frozen=True)
 class Findings:
-    """The experiments, each one for every machine."""
+    """The experiments, each one for every machine, and forward kinematics by passes, which the paper does not have."""
 
     extent: Extent
     efficacy: list[Efficacy]
     efficiency: list[Efficiency]
     robustness: list[Robustness]
+    forward: list[Forward]
 
 
 def run(quick: bool = False, on_progress: Callable[[int, int], None] | None = None) -> Findings:
@@ -32,11 +34,13 @@ def run(quick: bool = False, on_progress: Callable[[int, int], None] | None = No
     """
     extent, all_cases = (QUICK if quick else FULL), cases()
     tick = _Tick(expected(extent, all_cases), on_progress)
+    random = [efficiency.run(case, extent, tick) for case in all_cases]
     return Findings(
         extent=extent,
         efficacy=[efficacy.run(case, extent, tick) for case in all_cases],
-        efficiency=[efficiency.run(case, extent, tick) for case in all_cases],
+        efficiency=random,
         robustness=[robustness.run(case, extent, tick) for case in all_cases],
+        forward=[forward.run(each, extent.repeats, tick) for each in random],
     )
 
 
@@ -54,4 +58,4 @@ class _Tick:
 
 def expected(extent: Extent, all_cases: tuple[Case, ...]) -> int:
     """About how many parts there are; a third of the steps of a circle leave the workspace."""
-    return len(all_cases) * (3 + min(extent.searches, extent.steps // 3))
+    return len(all_cases) * (4 + min(extent.searches, extent.steps // 3))

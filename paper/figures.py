@@ -58,7 +58,7 @@ def draw_efficacy(found: Sequence[Efficacy], path: Path) -> None:
 def draw_errors(axes: Axes, found: Efficacy, what: str, unit: str, printed: float | None) -> None:
     """Errors over the steps on a logarithmic axis; what is exactly 0 is drawn at its lower end."""
     least = 1e-17
-    names = {"paper": ("with the paper's E and passes alone", 0), "default": ("by default", 1)}
+    names = {"paper": ("by the paper's passes", 0), "default": ("by default", 1)}
     for name, (label, place) in names.items():
         values = np.maximum(getattr(found.runs[name], what), least)
         axes.plot(values, label=label, linewidth=1.4, **line_style(place))
@@ -76,17 +76,17 @@ def draw_efficiency(found: Sequence[Efficiency], path: Path) -> None:
     figure = Figure(figsize=(13, 5), layout="constrained", dpi=DPI)
     left, right = figure.subplots(1, 2)
     ratios = {
-        "paper": [each.case.printed.ratio for each in found],
-        "passes, single": [each.ratio_of_passes("cold") for each in found],
+        "printed": [each.case.printed.ratio for each in found],
+        "paper's passes, single": [each.ratio_of_passes("cold") for each in found],
         "default, batch": [each.ratio("cold") for each in found],
     }
     draw_bars(left, [each.case.label for each in found], ratios)
     left.axhline(1.0, color=EDGE, linewidth=1)
     left.set(yscale="log", ylabel="time ÷ geometric approach", title="time, one core")
     passes = {
-        "paper": [each.case.printed.iterations for each in found],
-        "ours, cold start": [each.answers["paper", "cold"].iterations for each in found],
-        "ours, warm start": [each.answers["paper", "warm"].iterations for each in found],
+        "printed": [each.case.printed.iterations for each in found],
+        "paper's passes, cold start": [each.answers["paper", "cold"].iterations for each in found],
+        "paper's passes, warm start": [each.answers["paper", "warm"].iterations for each in found],
         "accelerated, cold start": [each.answers["accelerated", "cold"].iterations for each in found],
     }
     draw_bars(right, [each.case.label for each in found], passes)
@@ -103,7 +103,7 @@ def draw_bars(axes: Axes, groups: Sequence[str], series: dict[str, list[float]])
     for place, ((name, values), (colour, hatch)) in enumerate(zip(series.items(), looks, strict=False)):
         at = np.arange(len(groups)) + (place - (len(series) - 1) / 2) * width
         bars = axes.bar(at, values, width, label=name, color=colour, hatch=hatch, edgecolor=EDGE, linewidth=0.8)
-        axes.bar_label(bars, fmt="{:.2g}", fontsize=8, padding=1)
+        axes.bar_label(bars, fmt=lambda value: "" if np.isnan(value) else f"{value:.2g}", fontsize=8, padding=1)
     axes.set_xticks(np.arange(len(groups)), groups)
     axes.grid(axis="y", alpha=0.3)
     axes.set_axisbelow(True)
@@ -115,7 +115,7 @@ def draw_bars(axes: Axes, groups: Sequence[str], series: dict[str, list[float]])
 
 
 def draw_robustness(found: Sequence[Robustness], path: Path) -> None:
-    """Nine panels, a row for each machine: the path, joint values, the cost of each step."""
+    """Nine panels, a row for each machine, by the paper's passes: the path, joint values, the cost of each step."""
     figure = Figure(figsize=(15.5, 4.8 * len(found)), layout="constrained", dpi=DPI)
     grid = figure.add_gridspec(len(found), 3, width_ratios=(1, 1.25, 1))
     titled = []
@@ -127,17 +127,18 @@ def draw_robustness(found: Sequence[Robustness], path: Path) -> None:
         draw_cost(cost_panel, each)
         titled += [path_panel, parts[0], cost_panel]
     letters(titled)
-    figure.suptitle("Circles that leave the workspace (grey bands: steps that are projected)")
+    figure.suptitle("Circles that leave the workspace, by the paper's passes (grey bands: steps that are projected)")
     figure.savefig(path)
 
 
 def draw_path(axes: Axes, found: Robustness) -> None:
     """What was asked for, what was taken, and the edge of the workspace."""
     unit, edges = found.case.mechanism.length_unit, found.workspace.vertices[found.workspace.faces]
-    asked, taken, off = found.targets[:, 1:3, 3], found.solution.pose[:, 1:3, 3], found.projected
+    asked, taken, off = found.targets[:, 1:3, 3], found.paper.solution.pose[:, 1:3, 3], found.paper.projected
     axes.plot(*edges.T, color=EDGE, linewidth=1)
     axes.plot(*asked.T, color=ASKED, linestyle="--", linewidth=1.6, label="asked for")
     axes.plot(*taken.T, color=ACHIEVED, linewidth=1.8, label="achieved")
+    axes.plot(*found.runs["default"].solution.pose[:, 1:3, 3].T, label="by default", **line_style(2))
     axes.plot(*taken[off].T, "o", color=HELD, markersize=2.5, label="projected step")
     axes.set(xlabel=f"y [{unit}]", ylabel=f"z [{unit}]", title=f"{found.case.label}: path")
     axes.set_aspect("equal", adjustable="datalim")
@@ -148,7 +149,7 @@ def draw_path(axes: Axes, found: Robustness) -> None:
 def draw_joints(panels: Sequence[Axes], found: Robustness) -> None:
     """Values of the joints that are shown, with their limits; a panel for each."""
     for axes, name in zip(panels, found.case.shown, strict=True):
-        draw_joint(axes, found.solution, name)
+        draw_joint(axes, found.paper.solution, name)
     panels[0].set_title(f"{found.case.label}: joint values and limits")
     panels[-1].set_xlabel("step")
     below = BELOW | {"bbox_to_anchor": (0.5, -0.16 * len(panels))}
@@ -156,14 +157,14 @@ def draw_joints(panels: Sequence[Axes], found: Robustness) -> None:
 
 
 def draw_cost(axes: Axes, found: Robustness) -> None:
-    """Passes and time of each step; one time in a hundred, an interruption, may lie above the panel."""
-    shade_steps(axes, found.projected)
-    passes = axes.plot(found.solution.iterations, label="passes", linewidth=1.4, **line_style(0))
+    """Passes and time of each step, on logarithmic axes: out of reach they are hundreds of times those within."""
+    shade_steps(axes, found.paper.projected)
+    passes = axes.plot(found.paper.solution.iterations, label="passes", linewidth=1.4, **line_style(0))
     axes.set(xlim=(0, len(found.targets) - 1), xlabel="step", ylabel="passes", title=f"{found.case.label}: cost")
-    axes.set(ylim=(0, None))
+    axes.set(yscale="log", ylim=(0.8, None))
     axes.grid(alpha=0.3)
     clock = axes.twinx()
     times = clock.plot(1e6 * found.seconds, label="time of one call from Python", linewidth=1.2, **line_style(4))
-    clock.set(ylabel="time [µs]", ylim=(0, 1.15e6 * np.quantile(found.seconds, 0.99)))
+    clock.set(ylabel="time [µs]", yscale="log")
     band = Line2D([], [], color=SHADE, linewidth=7, label="projected")
     axes.legend(handles=[*passes, *times, band], **BELOW, ncols=3)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from . import efficacy, efficiency, figures, robustness
+from . import efficacy, efficiency, figures, forward, robustness
 from .everything import Findings
 from .report import report
 from .tables import write_csv
@@ -15,7 +15,9 @@ def write(findings: Findings, folder: Path) -> None:
     write_csv(folder / "efficacy.csv", [row for each in findings.efficacy for row in efficacy.summary(each)])
     write_csv(folder / "efficiency.csv", [row for each in findings.efficiency for row in efficiency.summary(each)])
     write_csv(folder / "efficiency_times.csv", [row for e in findings.efficiency for row in efficiency.time_rows(e)])
-    write_csv(folder / "robustness.csv", [robustness.summary(each) for each in findings.robustness])
+    write_csv(folder / "robustness.csv", [row for each in findings.robustness for row in robustness.summary(each)])
+    write_csv(folder / "forward.csv", [forward.summary(each) for each in findings.forward])
+    write_csv(folder / "forward_times.csv", [forward.time_row(each) for each in findings.forward])
     write_csv(folder / "jumps.csv", [row for each in findings.robustness for row in robustness.jump_rows(each)])
     for inside in findings.efficacy:
         write_csv(folder / f"efficacy_{inside.case.key}.csv", efficacy.steps(inside))

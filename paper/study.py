@@ -17,9 +17,18 @@ from .arrays import Floats
 
 Tick = Callable[[], None]
 
-SETTINGS = {"paper": passes.Options.paper(), "accelerated": passes.Options.accelerated(), "default": Options()}
-"""The paper's passes, with its E and its projection; passes with exact meetings and half-spaces, which are not its own;
-and what the library does unless told otherwise: where legs have closed forms it takes them, and no passes at all."""
+SETTINGS = {
+    "paper": passes.Options.paper(),
+    "extended": passes.Options.extended(),
+    "accelerated": passes.Options.accelerated(),
+    "default": Options(),
+}
+"""The paper's passes, with its E and its projection; these with two rules and a clamp that are not the paper's; passes
+with exact meetings and half-spaces, which are not its own either; and what the library does unless told otherwise:
+where legs have closed forms it takes them, and no passes at all."""
+
+LEAVING = SETTINGS | {"centroid": passes.Options.centroid()}
+"""What follows circles that leave the workspace: also the paper's projection, by least-squares fits, not passes."""
 
 
 def solve(mechanism: Mechanism, targets: Floats, options: Options, start: Solution | None = None) -> Solution:

@@ -17,3 +17,6 @@ ROTATION_MATRIX = 1e-6
 ALIGNMENT = 1e-6
 """Sine of the angle up to which two axes count as parallel, and length [L] up to which a link has none: descriptions
 are often typed with four to six digits."""
+
+ASSEMBLED = 1e-6
+"""Difference of two poses up to which they are the same assembly [L, and entries of the rotation]."""

@@ -148,7 +148,7 @@ def answers(name: str, record: str) -> Iterator[Any]:
 
     near, far, beyond = poses(0.1), poses(0.5), poses(2.0)
     if record == "passes.pass_constants":
-        for method in ("plain", "accelerated", "centroid"):
+        for method in ("paper", "extended", "accelerated", "centroid"):
             yield pf.passes.solve(asked, far, pf.passes.Options(method=method))
         return
     first, there = pf.solve_ik(asked, near), pf.solve_ik(asked, far)

@@ -51,7 +51,7 @@ def test_clamp_cone_gives_the_nearest_vector_in_the_cone(half_angle: float) -> N
     """No vector of the cone comes nearer; only where the nearest would be none at all, a thousandth is kept."""
     rng = np.random.default_rng(1)
     for axis, d in zip(directions(rng, 30), rng.normal(size=(30, 3)), strict=True):
-        clamped = np.array(clamp_cone(triple(axis), half_angle, triple(d)))
+        clamped = np.array(clamp_cone(triple(axis), half_angle, triple(d), False))
         size = np.linalg.norm(d)
         assert np.arctan2(np.linalg.norm(np.cross(axis, clamped)), axis @ clamped) <= half_angle + 1e-12
         if np.arccos(axis @ unit(d)) < half_angle - 1e-12:
@@ -69,7 +69,7 @@ def test_clamp_cone_gives_the_nearest_vector_in_the_cone(half_angle: float) -> N
 
 def test_clamp_cone_finds_a_direction_opposite_to_its_axis() -> None:
     for axis in np.vstack([np.eye(3), -np.eye(3), directions(np.random.default_rng(3), 10)]):
-        clamped = np.array(clamp_cone(triple(axis), 0.5, triple(-3.0 * axis)))
+        clamped = np.array(clamp_cone(triple(axis), 0.5, triple(-3.0 * axis), False))
         assert unit(clamped) @ axis == pytest.approx(np.cos(0.5), abs=1e-12)
 
 

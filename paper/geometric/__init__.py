@@ -6,8 +6,9 @@ preparation and its own compiled code.
 
 from __future__ import annotations
 
+from .compiled import IS_COMPILED
 from .errors import NoClosedForm
 from .ik import Geometric, solve_ik
 from .single import one_by_one
 
-__all__ = ["Geometric", "NoClosedForm", "one_by_one", "solve_ik"]
+__all__ = ["IS_COMPILED", "Geometric", "NoClosedForm", "one_by_one", "solve_ik"]

@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from pfabrik import Mechanism, SubChain
-from tools.kernels.on_call import kernel, routine
 
 from ..arrays import Floats, Records
 from ..step import Step
 from ..tolerances import LIMIT
+from .compiled import kernel, routine
 from .facts import Interval, centre, home_of, range_of, require, tolerances
 from .struts import FOOT_SIZE, measure_strut, read_strut, strut_records, write_status, write_strut
 from .targets import BLOCK, FREE, OVER, Statuses, load_block

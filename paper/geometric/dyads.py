@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from pfabrik import Mechanism, SubChain
-from tools.kernels.on_call import kernel, routine
 
 from ..arrays import Floats, Records
 from ..step import Step
 from ..tolerances import ALIGNMENT, LIMIT
+from .compiled import kernel, routine
 from .facts import Interval, centre, home_of, is_parallel, range_of, require, tolerances
 from .struts import write_status
 from .targets import BLOCK, FREE, OVER, Statuses, load_block

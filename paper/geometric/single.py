@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from pfabrik import Mechanism
-from tools.kernels.on_call import for_each
 
 from ..arrays import Floats
+from .compiled import for_each
 from .ik import Geometric
 from .targets import Statuses
 from .topologies import Kernel, closed_form

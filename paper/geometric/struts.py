@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pfabrik import Mechanism, SubChain
-from tools.kernels.on_call import kernel, routine
 
 from ..arrays import Floats, Records
 from ..step import Step
 from ..tolerances import ALIGNMENT
+from .compiled import kernel, routine
 from .facts import NO_CONE, centre, home_of, is_parallel, least_cosine, range_of, require, tolerances
 from .targets import BLOCK, FREE, OVER, REACHED, Statuses, load_block
 

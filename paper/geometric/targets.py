@@ -8,10 +8,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from tools.kernels.on_call import routine
-
 from ..arrays import Floats
 from ..tolerances import ROTATION_MATRIX
+from .compiled import routine
 
 Statuses: TypeAlias = NDArray[np.int64]
 

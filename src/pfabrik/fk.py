@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .common.arguments import as_floats
-from .common.arrays import Floats
+from .common.arrays import Floats, Mask
 from .common.checks import require_each
 from .engines.engine import engine_of
 from .engines.joints.assemble import forward_answers
@@ -72,10 +72,7 @@ def solve_fk(
     if shape == () and np.vdot(values, values) <= HORIZON**2:  # one row of numbers, with nothing to set aside
         solutions = forward(values, begin, options.actuator_tolerance)
         return Solution(mechanism, solutions, shape, values=values if solutions.rows.status[0] != REACHED else None)
-    is_valid = np.asarray(np.isfinite(values).all(axis=1))
-    if options.on_invalid == "raise" and not is_valid.all():
-        bad = np.flatnonzero(~is_valid)[:5].tolist() if shape else ()
-        raise InvalidArgument("actuators", "a value that is not finite", "finite values", rows=bad)
+    is_valid = finite_rows(values, shape, options)
     starts = begin if begin is None or len(begin) == 1 else begin.at(np.flatnonzero(is_valid))
     clipped = np.clip(values[is_valid], -HORIZON, HORIZON)
     solutions = forward(clipped, starts, options.actuator_tolerance)
@@ -83,6 +80,15 @@ def solve_fk(
     rows.status[(beyond > 0.0) & (rows.status == REACHED)] = PROJECTED
     rows.measures[:, ACTUATOR_ERROR] = np.maximum(rows.measures[:, ACTUATOR_ERROR], beyond)
     return Solution(mechanism, solutions.scatter(is_valid), shape, values=values.copy())
+
+
+def finite_rows(values: Floats, shape: tuple[int, ...], options: Options) -> Mask:
+    """Rows of actuated values (n, n_a) that are finite, (n,); InvalidArgument for others, unless they are marked."""
+    is_valid = np.asarray(np.isfinite(values).all(axis=1))
+    if options.on_invalid == "raise" and not is_valid.all():
+        bad = np.flatnonzero(~is_valid)[:5].tolist() if shape else ()
+        raise InvalidArgument("actuators", "a value that is not finite", "finite values", rows=bad)
+    return is_valid
 
 
 def solution_at(mechanism: Mechanism, coordinates: Floats, values: Floats) -> Solution:

@@ -1,6 +1,6 @@
 """Draw the pictures of docs/p-fabrik.md, and print its table of rates. Run it as `python tools/site/p_fabrik.py`.
 
-The passes that are drawn are a few lines of NumPy here; only the last picture asks the library.
+The first picture, that of the passes that stall, and the last ask the library; others are a few lines of NumPy here.
 """
 
 from __future__ import annotations
@@ -28,7 +28,10 @@ BENDS = (80, 70, 60, 50, 40, 30, 20)
 def main() -> None:
     """Write the pictures as SVG, the same in every run."""
     mpl.rcParams.update({"svg.hashsalt": "p-fabrik", "svg.fonttype": "none", "font.size": 9})
-    for name, draw in (("pass", a_pass), ("rate", rate), ("half-space", half_space), ("count", count)):
+    trace = pf.passes.trace(pf.load("five_bar"), [0, 30, 150])
+    trace.plot(size=(8.5, 4.6)).savefig(FOLDER / "p-fabrik-pass.svg", metadata={"Date": None})
+    drawn = {"stall": stall, "rate": rate, "meeting": a_meeting, "half-space": half_space, "count": count}
+    for name, draw in drawn.items():
         figure = Figure(figsize=(8.5, 3.1), layout="constrained")
         draw(figure)
         figure.savefig(FOLDER / f"p-fabrik-{name}.svg", metadata={"Date": None})
@@ -55,24 +58,42 @@ def meeting(target: np.ndarray) -> np.ndarray:
     return along * u + np.sqrt(CRANK**2 - along**2) * np.array([-u[1], u[0]])
 
 
-def a_pass(figure: Figure) -> None:
-    """Inward, outward, and the meeting that passes tend to."""
+def a_meeting(figure: Figure) -> None:
+    """Where the crank's circle meets the rod's about the target, which passes tend to."""
     target, elbow = np.array([1.75, 0.35]), CRANK * np.array([np.cos(2.0), np.sin(2.0)])
-    moved = inward(elbow, target)
-    steps = (
-        ("inward: from the target", elbow, moved, target),
-        ("outward: from the base", moved, outward(moved), None),
-        ("meeting: both at once", elbow, meeting(target), target),
-    )
-    for axes, (title, before, after, end) in zip(figure.subplots(1, 3), steps, strict=True):
-        frame(axes, title)
-        axes.add_patch(Circle(BASE, CRANK, fill=False, color=OLD, linestyle=":"))
-        axes.add_patch(Circle(target, ROD, fill=False, color=GOAL, linestyle=":", alpha=0.6))
-        axes.plot(*np.array([BASE, before]).T, "o-", color=OLD)
-        tip = towards(after, target, ROD) if end is None else end
-        axes.plot(*np.array([BASE, after, tip] if title[0] != "i" else [after, tip]).T, "o-", color=NEW)
-        axes.plot(*target, "x", color=GOAL, markersize=9, markeredgewidth=2)
-        axes.set(xlim=(-1.2, 3.2), ylim=(-1.2, 1.8))
+    axes = figure.subplots()
+    frame(axes, "meeting: both circles at once")
+    axes.add_patch(Circle(BASE, CRANK, fill=False, color=OLD, linestyle=":"))
+    axes.add_patch(Circle(target, ROD, fill=False, color=GOAL, linestyle=":", alpha=0.6))
+    axes.plot(*np.array([BASE, elbow]).T, "o-", color=OLD)
+    axes.plot(*np.array([BASE, meeting(target), target]).T, "o-", color=NEW)
+    axes.plot(*target, "x", color=GOAL, markersize=9, markeredgewidth=2)
+    axes.set(xlim=(-1.2, 3.2), ylim=(-1.2, 1.8))
+
+
+def stall(figure: Figure) -> None:
+    """A step of the 5-bar's circle out of reach: the targets of all rounds, and the gap after each pass."""
+    machine, turn = pf.load("five_bar"), np.linspace(0, 2 * np.pi, 361)[:134]
+    circle = np.stack([0 * turn, 60 * np.sin(turn), 200 - 60 * np.cos(turn)], axis=1)
+    before = pf.passes.track(machine, circle[:-1])
+    trace = pf.passes.trace(machine, circle[-1], start=before[-1])
+    nearest = pf.solve_ik(machine, circle[-1]).pose[1:3, 3]
+    left, right = figure.subplots(1, 2)
+    starts = [stage for stage in trace if stage.kind in ("start", "revised")]
+    goals = np.array([stage.pose[1:3, 3] for stage in starts])
+    for first, colour in ((trace[0], OLD), (trace[-1], NEW)):
+        for branch in (slice(0, 3), slice(3, 6)):
+            left.plot(*first.nodes[branch, 1:].T, "o-", color=colour)
+    left.plot(*goals.T, ".-", color=GOAL, linewidth=0.8, label="targets of the rounds")
+    left.plot(*goals[0], "x", color=GOAL, markersize=9, markeredgewidth=2, label="asked for")
+    left.plot(*nearest, "*", color="black", markersize=9, label="nearest pose")
+    left.set_aspect("equal")
+    left.set_axis_off()
+    left.legend(fontsize=7, loc="upper right", bbox_to_anchor=(-0.2, 1.0), frameon=False)
+    right.semilogy(trace.gaps, color=NEW, linewidth=0.8)
+    right.set(xlabel="passes", ylabel="largest gap of a chain's end [mm]", title=f"{trace.rounds} rounds")
+    away = [float(np.linalg.norm(each - goals[0])) for each in (goals[-1], nearest)]
+    sys.stdout.write(f"{trace}; {away[0]:.1f} mm away, where the nearest pose is {away[1]:.1f} mm away\n")
 
 
 def frame(axes: Axes, title: str) -> None:

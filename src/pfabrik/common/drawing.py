@@ -34,9 +34,9 @@ class Plotted(Protocol):
     def plot(self, *args: Any, **options: Any) -> Any: ...
 
 
-def drawn(result: object, *args: Any) -> Any:
+def drawn(result: object, *args: Any, **options: Any) -> Any:
     """Draw a result by the function that `pfabrik.view`, above it, has for its class."""
-    return above("view.picture_of")(type(result).__name__)(result, *args)
+    return above("view.picture_of")(type(result).__name__)(result, *args, **options)
 
 
 def new_figure(

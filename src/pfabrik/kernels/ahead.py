@@ -65,7 +65,7 @@ _CLOSED = Closed(*_values("f2 f3 f2 f2 f2 i1"))
 _FIRST_ORDER = FirstOrder(*_values("f3 f3 f2 f2 f2 f3 f3 f2 f3 f3"))
 _FIRST_ORDER_PLAN = FirstOrderPlan(*_values("F2 F1 F2 I1 F2 i i i f f i"))
 _PASSES = (
-    P.Plan._make([*(_read(np.zeros(0, record)) for record in _PLAN_RECORDS), 0.0]),
+    P.Plan._make([*(_read(np.zeros(0, record)) for record in _PLAN_RECORDS), 0.0, 0]),
     *_values("F3"),
     P.Seeds(*_values("F3 F3 F2")),
     P.Settings(*_values("f i i i i f i")),

@@ -105,7 +105,7 @@ def _joints_with_centre(mechanism: Mechanism) -> frozenset[str]:
 
 def joint_points(compiled: CompiledPlan, results: P.PassResults) -> dict[str, Floats]:
     """Joint name -> position of its centre in the base frame, (n, 3); joints that act as one share a centre."""
-    carriers, trunk_centres = _carriers(compiled.plan, results.trunks)
+    carriers, trunk_centres = carriers_of(compiled.plan, results.trunks)
     points = {name: trunk_centres[joint] for name, joint in compiled.trunk_points}
     for point in compiled.points:
         T = results.poses if point.carrier < 0 else carriers[point.carrier]
@@ -126,7 +126,7 @@ def _node(plan: P.Plan, results: P.PassResults, k: int, carriers: list[Floats]) 
     return np.asarray(T[:, :3, :3] @ point + T[:, :3, 3])
 
 
-def _carriers(plan: P.Plan, trunk_values: Floats) -> tuple[list[Floats], list[Floats]]:
+def carriers_of(plan: P.Plan, trunk_values: Floats) -> tuple[list[Floats], list[Floats]]:
     """Poses (n, 4, 4) of the carriers (the base and every trunk's body), and the centres (n, 3) of the trunk joints."""
     n = len(trunk_values)
     carriers = [np.broadcast_to(np.eye(4), (n, 4, 4))]

@@ -6,6 +6,7 @@ Passes are plain, as in the paper, or use closed-form intersections and half-spa
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -32,7 +33,7 @@ from ..options import Options
 from ..tolerances import TOLERANCES
 from .joint_positions import holding, new_pass_results, place, positions_of
 from .pass_options import PassOptions
-from .plan import compile_plan
+from .plan import CompiledPlan, compile_plan
 
 NEAR = 1e-3
 """Tolerance of the passes [L] if the loops are closed exactly afterwards."""
@@ -42,19 +43,22 @@ STEPS = 8
 
 ROWS_A_BLOCK = 64
 
+BY_FALLBACK = -1
+"""Rounds of an answer that is not the passes': they ended beyond a limit, with open loops, or in another mode."""
+
 
 class PassesEngine(InverseEngine):
     """The paper's method, for mechanisms that joint positions express.
 
     Passes bring the ends of chains to the target or move the target; the loops are then closed exactly.
-    The fallback engine answers targets for which that fails; with the "centroid" method it answers all targets within
-    reach.
+    The fallback engine answers targets for which that fails, and marks them; with the "centroid" method it answers all
+    targets within reach.
     """
 
     def __init__(self, mechanism: Mechanism, fallback: Engine, options: PassOptions) -> None:
         self.mechanism, self._fallback, self._options = mechanism, fallback, options
         self._model = model_of(mechanism if mechanism.clearance is None else mechanism.with_clearance(None))
-        self._compiled, self._held = compile_plan(mechanism), holding(mechanism)
+        self._compiled, self._held = with_rules(compile_plan(mechanism), options), holding(mechanism)
 
     def answer(
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
@@ -68,6 +72,7 @@ class PassesEngine(InverseEngine):
             if len(failed):
                 fallback = self._fallback.answer(targets[failed], _at(start, failed), options, keep_mode=keep_mode)
                 solutions.put(failed, fallback, np.ones(len(failed), bool))
+                solutions.rows.counters[failed, ROUNDS] = BY_FALLBACK
             return solutions.scatter(is_valid)
         solutions = self._fallback.answer(targets, start, options, keep_mode=keep_mode)
         missed = np.flatnonzero(solutions.rows.status != REACHED)
@@ -77,6 +82,7 @@ class PassesEngine(InverseEngine):
             is_feasible = projected.rows.status != FAILED
             solutions = Configurations(solutions.rows, solutions.coordinates)
             solutions.put(missed[is_feasible], projected, is_feasible)
+            solutions.rows.counters[missed[~is_feasible], ROUNDS] = BY_FALLBACK
         return solutions.scatter(is_valid)
 
     def follow(
@@ -104,7 +110,7 @@ class PassesEngine(InverseEngine):
         solutions = self._solve_from(targets, coordinates, keep_mode)
         if keep_mode:
             has_left_mode = (self._branches_of(solutions) * self._branches_of(start) < 0.0).any(axis=1)
-            solutions.rows.status[has_left_mode] = FAILED
+            solutions.rows.status[np.broadcast_to(has_left_mode, len(targets))] = FAILED
         return solutions
 
     def _branches_of(self, configurations: Configurations | None) -> Floats:
@@ -195,6 +201,11 @@ class PassesEngine(InverseEngine):
 def _at(start: Configurations | None, places: NDArray[np.intp]) -> Configurations | None:
     """Select the starts of some rows; a single start for all rows is returned as it is."""
     return start if start is None or len(start) == 1 else start.at(places)
+
+
+def with_rules(compiled: CompiledPlan, options: PassOptions) -> CompiledPlan:
+    """The plan with the rules of passes that the options ask for."""
+    return replace(compiled, plan=compiled.plan._replace(is_literal=int(options.method == "paper")))
 
 
 @derived

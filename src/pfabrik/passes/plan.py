@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence, Sized
 from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,15 @@ class JointPoint:
     carrier: int  # the body that the axis turns with: as of `kernels.passes.plan`, or -1 for the platform
 
 
+class Lock(NamedTuple):
+    """Where the coordinate q of an actuator stands in the arrays: as sign * (q - origin)."""
+
+    what: Literal["stroke", "hinge", "rail", "end", "trunk"]  # as of `JointMeasure`, or a joint of a trunk
+    place: int  # of the node, the branch of the rail, or the trunk joint
+    origin: float
+    sign: float
+
+
 @dataclass(frozen=True)
 class CompiledPlan:
     """A mechanism as arrays, with the names that go with them.
@@ -38,6 +48,7 @@ class CompiledPlan:
     points : the centres of joints, as they follow from nodes.
     trunk_joints : names of the plan's trunk joints.
     trunk_points : those of them that have a centre, with their places among the plan's.
+    locks : of the actuators, in their order.
     home_seed : home, (1, ...).
     """
 
@@ -45,6 +56,7 @@ class CompiledPlan:
     points: tuple[JointPoint, ...]
     trunk_joints: tuple[str, ...]
     trunk_points: tuple[tuple[str, int], ...]
+    locks: tuple[Lock, ...]
     home_seed: P.Seeds
 
 
@@ -73,6 +85,7 @@ def _compiled(mechanism: Mechanism, chains: Sequence[tuple[Sequence[Step], Seque
         trunks=_spans(trunks, P.TRUNK_SPAN),
         trunk_joints=express_trunk(mechanism, steps),
         length=mechanism.characteristic_length,
+        is_literal=0,
     )
     plan.chains["trunk"] = carriers - 1
     return CompiledPlan(
@@ -80,8 +93,25 @@ def _compiled(mechanism: Mechanism, chains: Sequence[tuple[Sequence[Step], Seque
         tuple(_points(forms, plan.branches)),
         tuple(step.joint.name for step in steps),
         tuple((step.joint.name, place) for place, step in enumerate(steps) if step.joint.at is not None),
+        tuple(_locks(mechanism, steps, forms, plan.branches)),
         P.Seeds(mechanism.home_pose[None].copy(), plan.nodes["home"][None].copy(), np.zeros((1, len(steps)))),
     )
+
+
+def _locks(
+    mechanism: Mechanism, trunks: Sequence[Step], forms: Sequence[BranchForm], branches: Records
+) -> Iterator[Lock]:
+    """Where the coordinates of the actuators stand; each is in a trunk or a branch."""
+    locks = {}
+    for b, (form, branch) in enumerate(zip(forms, branches, strict=True)):
+        for measure in form.measures:
+            place = b if measure.what == "rail" else int(branch["first"]) + measure.node
+            locks[measure.joint] = Lock(measure.what, place, measure.origin, measure.sign)
+    for place, step in enumerate(trunks):
+        home = mechanism.home_coordinate(step.joint.name)
+        assert isinstance(home, float)
+        locks[step.joint.name] = Lock("trunk", place, home, 1.0)
+    yield from (locks[drive.joint.name] for drive in mechanism.drives)
 
 
 def _offsets(parts: Iterable[Sized]) -> Ints:

@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 from ..answers.pace import pace_of
 from ..answers.solution import Solution
 from ..answers.start_configuration import Start
 from ..answers.tracked import Track
+from ..common.arrays import Mask
 from ..common.derived import derived
 from ..engines.engine import engine_of
 from ..engines.joints.engine_contract import InverseEngine
 from ..engines.targets import Target
 from ..ik import solve_by
 from ..machine.decomposition.decompose import positions_express
-from ..machine.description.mechanism import Mechanism
+from ..machine.description.mechanism import Mechanism, checked_mechanism
 from ..machine.model import Model, model_of
 from ..options import options_or
 from ..track import as_path, follow_by
-from .pass_options import PassOptions
-from .passes_engine import PassesEngine
+from .pass_options import PAPER, PassOptions
+from .passes_engine import BY_FALLBACK, PassesEngine
 
 
 def solve(
     mechanism: Mechanism, target: Target, options: PassOptions | None = None, *, start: Start | None = None
 ) -> Solution:
     """Solve for targets by passes; by `solve_ik` if joint positions do not express the mechanism (`decompose`).
+
+    Where passes end beyond a limit or with open loops, `solve_ik` answers (`by_fallback`).
 
     Parameters
     ----------
@@ -36,7 +41,7 @@ def solve(
     start : Solution or array (..., nq), optional
         Start as in `solve_ik`.
     """
-    options = options_or(PAPER, options)
+    options = options_or(PAPER, options).of(checked_mechanism(mechanism))
     return solve_by(lambda machine: _engine(model_of(machine), options), mechanism, target, start, options)
 
 
@@ -56,17 +61,25 @@ def track(
     start : Solution or array (nq,), optional
         Start as in `pfabrik.track`.
     """
-    options = options_or(PAPER, options)
+    options = options_or(PAPER, options).of(checked_mechanism(mechanism))
     poses = as_path(mechanism, targets, options)
     engine = _engine(model_of(mechanism), options)
     solutions, request = follow_by(engine, mechanism, poses, start, options, None)
     return Track(mechanism, solutions, request, pace_of(mechanism, len(poses), None, None, None), engine)
 
 
+def by_fallback(solution: Solution) -> bool | Mask:
+    """True for answers of `pfabrik.passes` that passes did not find: `rounds` is -1, another engine answered.
+
+    Parameters
+    ----------
+    solution : Solution
+        An answer, or a batch.
+    """
+    return cast(bool | Mask, solution.rounds == BY_FALLBACK)
+
+
 @derived
 def _engine(model: Model, options: PassOptions) -> InverseEngine:
     usual = engine_of(model.mechanism)
     return PassesEngine(model.mechanism, usual, options) if positions_express(model.mechanism) else usual
-
-
-PAPER = PassOptions.paper()

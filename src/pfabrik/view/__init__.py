@@ -7,6 +7,7 @@ from typing import Any
 PICTURES = {
     "SingularityMap": "singular_picture.plot_singular_map",
     "SingularityTrack": "singular_picture.plot_singular_track",
+    "PassTrace": "trace_picture.plot_trace",
     "Workspace": "workspace_picture.plot_workspace",
 }
 """What draws results that lie below this package, by their classes."""

@@ -88,7 +88,7 @@ def animate(
     suffix = require_ending(path, FILMS)
     steps = _steps(track, known, seconds)
     require("pictures", "matplotlib", "plot")
-    writer = _writer(suffix)
+    writer = film_writer(suffix)
     if len(known) < 2:
         raise InvalidArgument("track", f"{counted(len(known), 'step')} to show", "two or more: a film shows a motion")
     skeletons = {step: skeleton_of(track[step]) for step in np.unique(steps).tolist()}
@@ -116,7 +116,7 @@ def _steps(track: Track, known: NDArray[np.intp], seconds: float | None) -> NDAr
     return known[np.linspace(0, len(known) - 1, frames).round().astype(np.intp)]
 
 
-def _writer(suffix: str) -> Any:
+def film_writer(suffix: str) -> Any:
     """The writer of films with that ending."""
     from matplotlib import animation, rcParams
 

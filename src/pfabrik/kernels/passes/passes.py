@@ -63,8 +63,8 @@ def end_gap(plan: Plan, b: int, config: Configuration) -> float:
 
 
 @routine
-def pass_over_chain(plan: Plan, c: int, config: Configuration) -> float:
-    """Run one iteration, forward and backward, of a chain; return the largest end gap."""
+def pass_inward(plan: Plan, c: int, config: Configuration) -> None:
+    """Pass from the targets of a chain's ends to its base, or to its trunk, which is told where branches want it."""
     chain = plan.chains[c]
     for b in range(chain["first"], chain["last"]):
         first = plan.branches[b]["first"]
@@ -73,7 +73,13 @@ def pass_over_chain(plan: Plan, c: int, config: Configuration) -> float:
         base_target = vec(config.nodes[first])
         put(config.base_targets[b], base_target)
         config.is_displaced[b] = 1 if norm(sub(base_target, present)) > CONTENT * plan.length else 0
-    if chain["trunk"] >= 0:
+
+
+@routine
+def pass_over_chain(plan: Plan, c: int, config: Configuration) -> float:
+    """Run one iteration, forward and backward, of a chain; return the largest end gap."""
+    pass_inward(plan, c, config)
+    if plan.chains[c]["trunk"] >= 0:
         fit_trunk(plan, c, config)
     return pass_outward(plan, c, config)
 

@@ -80,7 +80,7 @@ TRANSLATES, TURNS = 1, 2
 
 
 class Plan(NamedTuple):
-    """A mechanism, flattened."""
+    """A mechanism, flattened, and the rules of passes over it."""
 
     nodes: Records
     branches: Records
@@ -89,6 +89,10 @@ class Plan(NamedTuple):
     trunks: Records
     trunk_joints: Records
     length: float  # L
+    is_literal: (
+        int  # 1: the paper's text, where clamps to cones keep the length, inward steps know the platform's cones
+    )
+    # alone, and every branch moves its trunk
 
 
 class Configuration(NamedTuple):

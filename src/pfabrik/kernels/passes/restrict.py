@@ -57,24 +57,24 @@ def any_normal(a: Vec) -> Vec:
 
 
 @routine
-def clamp_cone(axis: Vec, half_angle: float, d: Vec) -> Vec:
-    """The nearest vector to `d` within `half_angle` of the unit vector `axis`."""
+def clamp_cone(axis: Vec, half_angle: float, d: Vec, keeps_length: bool) -> Vec:
+    """The vector within `half_angle` of the unit vector `axis` that is nearest to `d`, or nearest of those as long."""
     angle = angle_between(axis, d)
     if angle <= half_angle:
         return d
     length, radial = norm(d), flatten(d, axis)
     size = norm(radial)
     radial = scale(1.0 / size, radial) if size > NO_SIDE * length else any_normal(axis)
-    kept = length * max(math.cos(angle - half_angle), LEAST_SHARE)
+    kept = length if keeps_length else length * max(math.cos(angle - half_angle), LEAST_SHARE)
     return add(scale(kept * math.cos(half_angle), axis), scale(kept * math.sin(half_angle), radial))
 
 
 @routine
-def keep_in_cone(cone: Record, axis: Vec, d: Vec) -> Vec:
+def keep_in_cone(cone: Record, axis: Vec, d: Vec, keeps_length: bool) -> Vec:
     """Clamp `d` to a cone about its present axis, with a quick exit for vectors well inside."""
     if dot(axis, d) > (cone["cosine"] + WELL_INSIDE) * norm(d):
         return d
-    return clamp_cone(axis, cone["half_angle"], d)
+    return clamp_cone(axis, cone["half_angle"], d, keeps_length)
 
 
 @inlined
@@ -105,7 +105,7 @@ def cone_axis(cone: Records, carrier: Floats, pose: Floats, normal: Vec, nodes: 
 @routine
 def restrict_step(plan: Plan, branch: Records, k: int, carrier: Floats, pose: Floats, nodes: Floats, d: Vec) -> Vec:
     """Clamp the step `d` from node k-1 to node k to the hinges and cones at both ends."""
-    normal = turn(carrier, vec(branch["normal"]))
+    normal, keeps_length = turn(carrier, vec(branch["normal"])), plan.is_literal == 1
     before = plan.nodes[k - 1]
     at_end = k == branch["last"]
     for _sweep in range(SWEEPS):
@@ -118,7 +118,7 @@ def restrict_step(plan: Plan, branch: Records, k: int, carrier: Floats, pose: Fl
                 angle = hinge_angle(plan, branch, k - 1, carrier, normal, nodes, d)
                 inside = min(max(angle, before["angle_lo"]), before["angle_hi"])
                 if inside != angle:
-                    kept = max(math.cos(inside - angle), LEAST_SHARE)
+                    kept = 1.0 if keeps_length else max(math.cos(inside - angle), LEAST_SHARE)
                     d = scale(kept, rotate(d, normal, inside - angle))
         if branch["cone_first"] == branch["cone_last"] and branch["end_plane"] == 0:
             break
@@ -129,9 +129,9 @@ def restrict_step(plan: Plan, branch: Records, k: int, carrier: Floats, pose: Fl
             if cone["fixed_to"] == PLATFORM_CONE:
                 if at_end:
                     axis = scale(-1.0, cone_axis(cone, carrier, pose, normal, nodes))
-                    d = keep_in_cone(cone, axis, d)
+                    d = keep_in_cone(cone, axis, d, keeps_length)
             elif cone["node"] == k - 1:
-                d = keep_in_cone(cone, cone_axis(cone, carrier, pose, normal, nodes), d)
+                d = keep_in_cone(cone, cone_axis(cone, carrier, pose, normal, nodes), d, keeps_length)
         if norm(sub(d, start)) <= UNMOVED * norm(start):
             break
     return d
@@ -143,23 +143,24 @@ def restrict_step_inward(
 ) -> Vec:
     """Clamp the step `d` from node k+1 to node k to the cones at both ends and to a plane fixed to the platform.
 
-    A cone at node k is fixed to a carrier or link that this pass has not moved yet: its present axis counts.
+    A cone at node k is fixed to a carrier or link that this pass has not moved yet: its present axis counts. In the
+    paper's text it restricts outward passes alone.
     """
-    normal = turn(carrier, vec(branch["normal"]))
+    normal, keeps_length = turn(carrier, vec(branch["normal"])), plan.is_literal == 1
     at_end = k + 1 == branch["last"]
     for _sweep in range(SWEEPS):
         start = d
         for c in range(branch["cone_first"], branch["cone_last"]):
             cone = plan.cones[c]
-            if cone["fixed_to"] != PLATFORM_CONE and cone["node"] == k:
+            if plan.is_literal == 0 and cone["fixed_to"] != PLATFORM_CONE and cone["node"] == k:
                 axis = scale(-1.0, cone_axis(cone, carrier, pose, normal, nodes))
-                d = keep_in_cone(cone, axis, d)
+                d = keep_in_cone(cone, axis, d, keeps_length)
         if at_end and branch["end_plane"] == 1:
             d = flatten(d, turn(pose, vec(branch["end_normal"])))
         for c in range(branch["cone_first"], branch["cone_last"]):
             cone = plan.cones[c]
             if cone["fixed_to"] == PLATFORM_CONE and at_end:
-                d = keep_in_cone(cone, cone_axis(cone, carrier, pose, normal, nodes), d)
+                d = keep_in_cone(cone, cone_axis(cone, carrier, pose, normal, nodes), d, keeps_length)
         if norm(sub(d, start)) <= UNMOVED * norm(start):
             break
     return d
@@ -169,7 +170,7 @@ def restrict_step_inward(
 def fit_trunk(plan: Plan, c: int, config: Configuration) -> None:
     """Fit a trunk, within its joint ranges, to the positions that the forward pass gave the branches' first nodes.
 
-    Gauss-Newton on the trunk's joint values. Branches whose first node is there already do not count.
+    Gauss-Newton on the trunk's joint values. Branches whose first node is there already count in the paper's text only.
     """
     trunk = plan.chains[c]["trunk"]
     first, last = plan.trunks[trunk]["first"], plan.trunks[trunk]["last"]
@@ -179,7 +180,7 @@ def fit_trunk(plan: Plan, c: int, config: Configuration) -> None:
             for j in range(n + 1):
                 system[i, j] = 0.0
         for b in range(plan.chains[c]["first"], plan.chains[c]["last"]):
-            if config.is_displaced[b] == 0:
+            if config.is_displaced[b] == 0 and plan.is_literal == 0:
                 continue
             present = move(config.carriers[trunk + 1], vec(plan.nodes[plan.branches[b]["first"]]["home"]))
             miss = sub(vec(base_targets[b]), present)

@@ -200,7 +200,7 @@ def beyond_positions(mechanism: Mechanism) -> tuple[str, ...]:
     chains = decompose(mechanism)
     reasons = tuple(f"sub-chain {chain}: {chain.reason}" for chain in chains if chain.reason is not None)
     expressed = {step.joint.name for chain in chains for step in chain.trunk}
-    expressed |= {joint for chain in chains for form in chain.branch_forms for joint in form.determined}
+    expressed |= {measure.joint for chain in chains for form in chain.branch_forms for measure in form.measures}
     driven = dict.fromkeys(drive.joint.name for drive in mechanism.drives)
     missing = (f"actuated joint {name} is in no sub-chain" for name in driven if name not in expressed)
     return reasons or tuple(missing)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -93,6 +93,26 @@ Interval: TypeAlias = tuple[float, float]
 FREE: Interval = (-math.inf, math.inf)
 
 
+@dataclass(frozen=True)
+class JointMeasure:
+    """A joint whose coordinate q follows from positions.
+
+    Attributes
+    ----------
+    joint : its name.
+    what : "stroke", the length of the segment to `node` from the one before; "hinge", the angle from home at `node`;
+        "rail", the distance from home of the first node; "end", the angle of the platform to the last segment.
+    node : a node, numbered within the branch.
+    origin, sign : the length, angle or distance is sign * (q - origin); 0 for an "end".
+    """
+
+    joint: str
+    what: Literal["stroke", "hinge", "rail", "end"]
+    node: int
+    origin: float = 0.0
+    sign: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class BranchForm:
     """One branch as the kernels take it, at home, in base coordinates; its parts are numbered within the branch.
@@ -102,7 +122,7 @@ class BranchForm:
     joints : names of the joints at each node; several where they act as one.
     shifts : from each node to the centre of its joints, along the axis of its hinge, (nodes,) [length].
     nodes, record, cones : as of `kernels.passes.plan`.
-    determined : joints whose value follows from the nodes.
+    measures : joints whose coordinates follow from the nodes.
     """
 
     joints: tuple[tuple[str, ...], ...]
@@ -110,7 +130,7 @@ class BranchForm:
     nodes: Records
     record: Record
     cones: Records
-    determined: tuple[str, ...]
+    measures: tuple[JointMeasure, ...]
 
 
 @dataclass
@@ -132,7 +152,7 @@ class _Draft:
     normal: Floats = field(default_factory=lambda: np.zeros(3))
     ends_in_plane: bool = False
     align: bool = False
-    determined: list[str] = field(default_factory=list)
+    measures: list[JointMeasure] = field(default_factory=list)
 
 
 def express_trunk(mechanism: Mechanism, steps: Sequence[Step]) -> Records:
@@ -163,7 +183,7 @@ def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -
     _classify(draft)
     _place_nodes(mechanism, draft)
     if (draft.align or draft.ends_in_plane) and len(joint_nodes) > 1:
-        draft.determined.append(joint_nodes[-1].steps[0].joint.name)
+        draft.measures.append(JointMeasure(joint_nodes[-1].steps[0].joint.name, "end", len(joint_nodes) - 1))
     tolerance = TOLERANCES.alignment * mechanism.characteristic_length
     cones = [
         _cone(draft, k, step, tolerance)
@@ -172,7 +192,7 @@ def express_branch(mechanism: Mechanism, steps: Sequence[Step], on_base: bool) -
         if step.joint.cone
     ]
     record = _record(mechanism, draft)
-    return BranchForm(joints, draft.shifts, draft.nodes, record, np.array(cones, P.CONE), tuple(draft.determined))
+    return BranchForm(joints, draft.shifts, draft.nodes, record, np.array(cones, P.CONE), tuple(draft.measures))
 
 
 def _record(mechanism: Mechanism, draft: _Draft) -> Record:
@@ -188,7 +208,7 @@ def _record(mechanism: Mechanism, draft: _Draft) -> Record:
     record["rail_lo"], record["rail_hi"] = FREE
     if draft.rail is not None:
         joint = draft.rail.joint
-        draft.determined.append(joint.name)
+        draft.measures.append(JointMeasure(joint.name, "rail", 0, _home(mechanism, joint), 1.0))
         record["rail"], record["rail_axis"] = 1, np.array(mechanism.home_axis(joint.name)) * draft.rail.sign
         record["rail_lo"], record["rail_hi"] = _from_home(mechanism, joint)
     return record
@@ -299,7 +319,7 @@ def _stroke(mechanism: Mechanism, draft: _Draft, k: int) -> Interval:
             raise NotExpressible(f"prismatic joint {joint.name} is measured along joints that are not its neighbours")
         sign = 1.0
     offset = home - sign * length
-    draft.determined.append(joint.name)
+    draft.measures.append(JointMeasure(joint.name, "stroke", k, offset, sign))
     lo, hi = sorted(((limits[0] - offset) * sign, (limits[1] - offset) * sign))
     return max(lo, 0.0), hi
 
@@ -308,7 +328,7 @@ def _range_hinge(mechanism: Mechanism, draft: _Draft, k: int) -> None:
     """Fill the range of the hinge in node k: deviations from home, about the branch's normal."""
     step, node, places = draft.joint_nodes[k].steps[0], draft.nodes[k], draft.nodes["home"]
     sense = _sense(step, draft.normal)
-    draft.determined.append(step.joint.name)
+    draft.measures.append(JointMeasure(step.joint.name, "hinge", k, _home(mechanism, step.joint), sense))
     node["angle_lo"], node["angle_hi"] = sorted(bound * sense for bound in _from_home(mechanism, step.joint))
     node["ranged"] = np.isfinite([node["angle_lo"], node["angle_hi"]]).any()
     if k > 0:
