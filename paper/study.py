@@ -118,7 +118,7 @@ class Extent:
     """Projected steps of each machine whose nearest feasible pose is searched; evenly spread."""
 
 
-FULL = Extent(steps=361, targets=1000, repeats=31, searches=1000)
+FULL = Extent(steps=361, targets=1000, repeats=15, searches=1000)
 QUICK = Extent(steps=73, targets=100, repeats=2, searches=6)
 
 
