@@ -279,7 +279,7 @@ def cost(found: Efficiency) -> Cells:
 
 
 BEYOND = f"""*Farther*: the distance from the target over that of the nearest feasible pose of the same orientation,
-which the default finds, or a general optimiser, whichever comes nearer; median, 95 % and worst. *Passes*: on average,
+which the default finds, or a general optimiser, whichever comes nearer; median, 95 % and worst. *Passes*: medians,
 of steps that the default reaches, and of the others. *Step*: the largest of an actuator outside or across the edge over
 the largest inside. *Leaps*: steps above {LEAP:g} times that. *Missed*: steps within reach that end elsewhere."""
 
@@ -306,13 +306,13 @@ def fallbacks(findings: Findings) -> str:
 
 def beyond_table(findings: Findings) -> str:
     """The third experiment, a row for each machine and set of options."""
-    header = ("", "farther", "passes within / beyond", "revisions, most", "step", "leaps", "missed")
+    header = ("", "farther", "passes within / beyond", "rounds, most", "step", "leaps", "missed")
     rows = [
         (
             f"{found.case.label}, {NAMES[name]}",
             spread(run.ratios),
             " / ".join(
-                number(float(np.mean(run.solution.iterations[part])), 2) for part in (~found.beyond, found.beyond)
+                number(float(np.median(run.solution.iterations[part])), 3) for part in (~found.beyond, found.beyond)
             ),
             str(int(run.solution.rounds.max())),
             f"{run.jump_ratio:.2f}",

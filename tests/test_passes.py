@@ -279,6 +279,15 @@ def test_answers_of_another_engine_are_marked(name: str, mode: str) -> None:
     np.testing.assert_allclose(answers.pose[marked], usual.pose, atol=1e-12)
 
 
+@pytest.mark.parametrize("name", ["delta", "rps", "agile_eye"])
+def test_answers_for_machines_that_passes_do_not_serve_are_marked(name: str) -> None:
+    mechanism = pf.load(name)
+    targets = np.repeat(mechanism.home_pose[None], 3, axis=0)
+    assert pf.passes.by_fallback(pf.passes.solve(mechanism, targets)).all()
+    assert pf.passes.by_fallback(pf.passes.track(mechanism, targets)).all()
+    assert (pf.solve_ik(mechanism, targets).rounds == 0).all()
+
+
 # --- step by step ----------------------------------------------------------------------------------------------------
 
 
@@ -311,6 +320,13 @@ def test_a_trace_is_drawn_half_by_half_and_filmed(tmp_path: Path) -> None:
     assert (tmp_path / "passes.gif").read_bytes().startswith(b"GIF")
 
 
+def test_a_trace_that_is_cut_says_so() -> None:
+    mechanism = pf.load("five_bar")
+    cut, whole = (pf.passes.trace(mechanism, [0, 44, 241], most=most) for most in (50, 10_000))
+    assert cut.is_cut and "stopped here" in str(cut) and cut.passes == 50
+    assert not whole.is_cut and whole.is_reached and "stopped" not in str(whole)
+
+
 def test_what_cannot_be_traced_is_refused() -> None:
     mechanism = pf.load("five_bar")
     with pytest.raises(pf.errors.InvalidArgument, match="one pose"):
@@ -319,8 +335,9 @@ def test_what_cannot_be_traced_is_refused() -> None:
         pf.passes.trace(mechanism, [0, 0, 150], Options.accelerated())
     with pytest.raises(pf.errors.InvalidArgument, match="most"):
         pf.passes.trace(mechanism, [0, 0, 150], most=0)
-    with pytest.raises(pf.errors.UnsupportedMechanism):
-        pf.passes.trace(pf.load("g1_ankle"), np.eye(4))
+    for name in ("g1_ankle", "delta"):  # positions do not express it; its task is no whole pose
+        with pytest.raises(pf.errors.UnsupportedMechanism):
+            pf.passes.trace(pf.load(name), pf.load(name).home_pose)
 
 
 # --- forward kinematics ----------------------------------------------------------------------------------------------
@@ -349,12 +366,26 @@ def test_forward_kinematics_by_passes_ends_in_the_assembly_that_newtons_method_e
     assert shift <= 1e-6 * length and turn <= 1e-6
 
 
+@pytest.mark.parametrize("name", ["delta", "canfield", "five_bar"])
+def test_what_newtons_method_reaches_passes_do_not_answer_worse(name: str) -> None:
+    """Far from home: passes may end beyond limits of passive joints, or elsewhere; Newton's method then answers."""
+    mechanism = pf.load(name)
+    home = pf.solve_ik(mechanism, mechanism.home_pose).actuators
+    values = home + np.random.default_rng(5).uniform(-1.5, 1.5, (40, len(home)))
+    by_passes, usual = pf.passes.solve_fk(mechanism, values), pf.solve_fk(mechanism, values)
+    assert np.isin(by_passes.status, (Status.REACHED, Status.PROJECTED)).all()
+    assert excess_of_joints(mechanism, by_passes).max() <= 1e-9
+    assert (by_passes.status[usual.status == Status.REACHED] == Status.REACHED).all()
+
+
 def test_forward_kinematics_by_passes_says_where_nothing_assembles() -> None:
     hexapod, mechanism = pf.load("stewart"), pf.load("five_bar")
     lengths = pf.solve_ik(hexapod, hexapod.home_pose).actuators + [300, -100, 0, 0, 0, 0]
     apart = pf.passes.solve_fk(hexapod, lengths, Options(max_rounds=2))
     assert apart.status is Status.PROJECTED and pf.passes.by_fallback(apart)
     np.testing.assert_array_equal(apart.actuators, pf.solve_fk(hexapod, lengths).actuators)
+    beyond = pf.passes.solve_fk(mechanism.without_limits(), [1e300, 0.3])
+    assert beyond.status is Status.PROJECTED and beyond.actuator_error >= 1e299
     values = np.array([pf.solve_fk(mechanism, pf.solve_ik(mechanism, [0, 10, 150]).actuators).actuators, [np.nan, 0.0]])
     with pytest.raises(pf.errors.InvalidArgument, match="finite"):
         pf.passes.solve_fk(mechanism, values)

@@ -8,7 +8,7 @@ from those of the default, and on which targets.
 # E = 0.01 mm (what `tolerance=None` means here, in whatever unit a machine has), and a target that is moved to where
 # the chains' ends agree until all of them reach it. The default, `pf.solve_ik`, solves legs in closed form where one
 # exists, and finds the nearest feasible pose by optimisation where a target is out of reach. `pf.passes.trace` shows
-# the passes of any machine one by one ([P-FABRIK](../p-fabrik.md)).
+# the passes one by one, of other machines too ([P-FABRIK](../p-fabrik.md)).
 import matplotlib.pyplot as plt
 import numpy as np
 

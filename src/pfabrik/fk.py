@@ -17,6 +17,7 @@ from .common.checks import require_each
 from .engines.engine import engine_of
 from .engines.joints.assemble import forward_answers
 from .engines.joints.close import measure_configurations
+from .engines.joints.configurations import Configurations
 from .errors import InvalidArgument
 from .kernels.rows import ACTUATOR_ERROR, PROJECTED, REACHED
 from .machine.description.mechanism import Mechanism, checked_mechanism
@@ -76,10 +77,15 @@ def solve_fk(
     starts = begin if begin is None or len(begin) == 1 else begin.at(np.flatnonzero(is_valid))
     clipped = np.clip(values[is_valid], -HORIZON, HORIZON)
     solutions = forward(clipped, starts, options.actuator_tolerance)
-    rows, beyond = solutions.rows, np.abs(clipped - values[is_valid]).max(axis=1)
+    count_clipped(solutions, clipped, values[is_valid])
+    return Solution(mechanism, solutions.scatter(is_valid), shape, values=values.copy())
+
+
+def count_clipped(solutions: Configurations, clipped: Floats, values: Floats) -> None:
+    """Count what was clipped of actuated values (n, n_a) among the errors of answers, which are then not REACHED."""
+    rows, beyond = solutions.rows, np.abs(clipped - values).max(axis=1)
     rows.status[(beyond > 0.0) & (rows.status == REACHED)] = PROJECTED
     rows.measures[:, ACTUATOR_ERROR] = np.maximum(rows.measures[:, ACTUATOR_ERROR], beyond)
-    return Solution(mechanism, solutions.scatter(is_valid), shape, values=values.copy())
 
 
 def finite_rows(values: Floats, shape: tuple[int, ...], options: Options) -> Mask:

@@ -12,9 +12,9 @@ from ..engines.engine import engine_of
 from ..engines.joints.close import measure_configurations
 from ..engines.joints.closure_engine import start_coordinates
 from ..errors import UnsupportedMechanism
-from ..fk import HORIZON, Actuators, as_values, finite_rows
+from ..fk import HORIZON, Actuators, as_values, count_clipped, finite_rows
 from ..kernels.passes import plan as P
-from ..kernels.rows import ITERATIONS, ROUNDS
+from ..kernels.rows import ITERATIONS, REACHED, ROUNDS
 from ..machine.description.mechanism import Mechanism, checked_mechanism
 from ..machine.model import model_of
 from ..options import options_or
@@ -24,6 +24,9 @@ from .pass_options import PAPER, PassOptions
 from .passes_engine import BY_FALLBACK
 from .plan import CompiledPlan, compile_plan
 
+MOST_PASSES = 10_000
+"""Passes after which values count as those of no assembly: of 600 that assemble none took half as many."""
+
 
 def solve_fk(
     mechanism: Mechanism, actuators: Actuators, options: PassOptions | None = None, *, start: Start | None = None
@@ -32,8 +35,8 @@ def solve_fk(
 
     With its actuators locked, the end of a strut keeps its distance from the base, the end of a rod its distance from a
     crank or carriage. A pass puts each end at the nearest such place to where the platform has it (a pass inward and
-    outward), then moves the platform to the ends: their centroid, and a step of the turn that fits best. Limits of
-    passive joints are left out. From the pose where all ends are within E, Newton's method closes the loops exactly.
+    outward), then moves the platform to the ends: their centroid, and a step of the turn that fits best. Limits are
+    left out. From the pose where all ends are within E, Newton's method closes the loops exactly.
 
     Parameters
     ----------
@@ -42,16 +45,16 @@ def solve_fk(
     actuators : array (..., n_a) or mapping of str to array
         Values as in `pfabrik.solve_fk`.
     options : Options, optional
-        Of these E, `max_iterations` times `max_rounds`, the most passes, `actuator_tolerance` and `on_invalid` count.
-        Default `Options.paper()`.
+        Of these E, `max_iterations` times `max_rounds`, the most passes (10,000 at most), `actuator_tolerance` and
+        `on_invalid` count. Default `Options.paper()`.
     start : Solution or array (..., nq), optional
         Start as in `pfabrik.solve_fk`.
 
     Returns
     -------
     Solution
-        As of `pfabrik.solve_fk`; `iterations` are passes. Where passes do not end within E, its answer, and `rounds` is
-        -1 (`by_fallback`).
+        As of `pfabrik.solve_fk`; `iterations` are passes. Where passes do not end within E, or do beyond a limit, Newton's
+        method answers from the start, and `rounds` is -1 (`by_fallback`).
 
     Raises
     ------
@@ -78,18 +81,18 @@ def solve_fk(
         start_coordinates(model, starts), (len(valid), start_coordinates(model, None).shape[1])
     )
     near = float(options.tolerance or TOLERANCES.position * model.length)
-    results = _follow(mechanism, compiled, locked, coordinates, near, options.max_iterations * options.max_rounds)
+    most = min(options.max_iterations * options.max_rounds, MOST_PASSES)
+    results = _follow(mechanism, compiled, locked, coordinates, near, most)
     placed = place(model.path_closure, compiled, coordinates.copy(), results)
     found = engine.as_configurations(measure_configurations(model, placed.coordinates))
     solutions = engine.forward(locked, found, options.actuator_tolerance)
     solutions.rows.counters[:, ITERATIONS], solutions.rows.counters[:, ROUNDS] = results.iterations, 0
-    missed = np.flatnonzero(results.gaps > near)
+    missed = np.flatnonzero((results.gaps > near) | (solutions.rows.status != REACHED))
     if len(missed):
         at = starts if starts is None or len(starts) == 1 else starts.at(missed)
-        solutions.put(
-            missed, engine.forward(locked[missed], at, options.actuator_tolerance), np.ones(len(missed), bool)
-        )
+        solutions = solutions.with_rows(missed, engine.forward(locked[missed], at, options.actuator_tolerance))
         solutions.rows.counters[missed, ROUNDS] = BY_FALLBACK
+    count_clipped(solutions, locked, values[valid])
     return Solution(mechanism, solutions.scatter(is_valid), shape, values=values.copy())
 
 
@@ -121,6 +124,8 @@ def locked_plan(compiled: CompiledPlan, values: Floats) -> P.Plan:
     plan = compiled.plan
     nodes, branches, joints = plan.nodes.copy(), plan.branches.copy(), plan.trunk_joints.copy()
     nodes["ranged"], branches["cone_last"] = 0, branches["cone_first"]
+    is_stroke = nodes["lo"] < nodes["hi"]
+    nodes["lo"][is_stroke], nodes["hi"][is_stroke] = 0.0, np.inf
     branches["rail_lo"], branches["rail_hi"] = -np.inf, np.inf
     joints["lo"], joints["hi"] = -np.inf, np.inf
     for (what, at, origin, sign), q in zip(compiled.locks, values.tolist(), strict=True):

@@ -11,8 +11,8 @@ from ..machine.description.mechanism import Mechanism
 from ..machine.files.units import METRES
 from ..options import Options
 
-MOST_ERROR = 1e-5, 1e-4
-"""E of the paper's passes: 0.01 mm [m]; where the machine's unit is no length [L]."""
+MOST_ERROR, OF_LENGTH, LARGEST_SHARE = 1e-5, 1e-4, 1e-3
+"""E of the paper's passes: 0.01 mm [m]; where the machine's unit is no length, and at most, in small machines [L]."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,8 @@ class PassOptions(Options):
     ----------
     tolerance : float, optional
         E, the largest distance of a chain's end from its target, and of an answer that is REACHED [length]. Default:
-        0.01 mm in the machine's unit for "paper" and "extended", or 1e-4 L where that unit is no length; else 1e-9 L.
+        0.01 mm in the machine's unit for "paper" and "extended", but at most 1e-3 L, and 1e-4 L where that unit is no
+        length (m, dm, cm, mm, um, in, ft are); else 1e-9 L.
     method : {"paper", "extended", "accelerated", "centroid"}
         "paper", the passes of the paper's text and its projection to the centroid of the chains' ends; "extended",
         these with two rules of ours and another clamp (`extended`); "accelerated", closed-form intersections,
@@ -62,7 +63,7 @@ class PassOptions(Options):
         """Options of the paper with two rules and a clamp that are ours, for machines with trunks and cones.
 
         A trunk goes to the mean of those branches that ask for a motion; cones restrict both passes; a clamp to a cone
-        takes the nearest vector in it, which is shorter by the cosine of the turn.
+        or a hinge's range takes the nearest vector there, which is shorter by the cosine of the turn.
         """
         return cls(method="extended")
 
@@ -80,8 +81,9 @@ class PassOptions(Options):
         """The options with the tolerance that E has in the unit of a machine."""
         if self.tolerance is not None or self.method not in ("paper", "extended"):
             return self
-        (error, share), metres = MOST_ERROR, METRES.get(mechanism.length_unit)
-        return replace(self, tolerance=error / metres if metres else share * mechanism.characteristic_length)
+        length, metres = mechanism.characteristic_length, METRES.get(mechanism.length_unit)
+        error = MOST_ERROR / metres if metres else OF_LENGTH * length
+        return replace(self, tolerance=min(error, LARGEST_SHARE * length))
 
 
 PAPER = PassOptions.paper()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import cast
+from typing import Any, cast
 
 from ..answers.pace import pace_of
 from ..answers.solution import Solution
@@ -11,9 +11,11 @@ from ..answers.tracked import Track
 from ..common.arrays import Mask
 from ..common.derived import derived
 from ..engines.engine import engine_of
+from ..engines.joints.configurations import Configurations
 from ..engines.joints.engine_contract import InverseEngine
 from ..engines.targets import Target
 from ..ik import solve_by
+from ..kernels.rows import ROUNDS
 from ..machine.decomposition.decompose import positions_express
 from ..machine.description.mechanism import Mechanism, checked_mechanism
 from ..machine.model import Model, model_of
@@ -26,9 +28,10 @@ from .passes_engine import BY_FALLBACK, PassesEngine
 def solve(
     mechanism: Mechanism, target: Target, options: PassOptions | None = None, *, start: Start | None = None
 ) -> Solution:
-    """Solve for targets by passes; by `solve_ik` if joint positions do not express the mechanism (`decompose`).
+    """Solve for targets by passes.
 
-    Where passes end beyond a limit or with open loops, `solve_ik` answers (`by_fallback`).
+    `solve_ik` answers, and such answers are marked (`by_fallback`), where passes end beyond a limit or with open loops,
+    and for mechanisms that joint positions do not express (`decompose`) or whose task leaves a part of the pose open.
 
     Parameters
     ----------
@@ -82,4 +85,26 @@ def by_fallback(solution: Solution) -> bool | Mask:
 @derived
 def _engine(model: Model, options: PassOptions) -> InverseEngine:
     usual = engine_of(model.mechanism)
-    return PassesEngine(model.mechanism, usual, options) if positions_express(model.mechanism) else usual
+    is_expressed = positions_express(model.mechanism)
+    return PassesEngine(model.mechanism, usual, options) if is_expressed else cast(InverseEngine, _Fallback(usual))
+
+
+class _Fallback:
+    """The usual engine, whose answers are marked."""
+
+    def __init__(self, usual: InverseEngine) -> None:
+        self._usual = usual
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._usual, name)
+
+    def answer(self, *given: Any, **options: Any) -> Configurations:
+        return _marked(self._usual.answer(*given, **options))
+
+    def follow(self, *given: Any, **options: Any) -> Configurations:
+        return _marked(self._usual.follow(*given, **options))
+
+
+def _marked(solutions: Configurations) -> Configurations:
+    solutions.rows.counters[:, ROUNDS] = BY_FALLBACK
+    return solutions

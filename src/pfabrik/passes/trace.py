@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
@@ -18,7 +18,7 @@ from ..engines.joints.closure_engine import start_coordinates
 from ..engines.joints.descend import clip_targets
 from ..engines.joints.projection import modes_of
 from ..engines.targets import Target, as_targets
-from ..errors import InvalidArgument, counted
+from ..errors import InvalidArgument, UnsupportedMechanism, counted
 from ..kernels.passes import passes as kernels
 from ..kernels.passes import plan as P
 from ..kernels.passes.restrict import fit_trunk, revise_target
@@ -86,12 +86,15 @@ class PassTrace(Plotted):
         step; then, where chains do not reach, the target's revision.
     tolerance : float
         E [length].
+    is_cut : bool
+        True if the passes would have gone on: `most` of them were made.
     """
 
     mechanism: Mechanism
     target: Floats
     stages: tuple[Stage, ...]
     tolerance: float
+    is_cut: bool
 
     def __len__(self) -> int:
         return len(self.stages)
@@ -126,8 +129,8 @@ class PassTrace(Plotted):
     def __str__(self) -> str:
         ends = "all ends within" if self.is_reached else "ends not within"
         passes, revisions = f"{self.passes} pass{'es' * (self.passes != 1)}", counted(self.rounds, "revision")
-        unit = self.mechanism.length_unit
-        return f"{self.mechanism.name}: {passes}, {revisions} of the target; {ends} {self.tolerance:.4g} {unit}"
+        unit, cut = self.mechanism.length_unit, "; stopped here" if self.is_cut else ""
+        return f"{self.mechanism.name}: {passes}, {revisions} of the target; {ends} {self.tolerance:.4g} {unit}{cut}"
 
     def plot(self, passes: int = 1, *, view: View | None = None, size: Size | None = None) -> Figure:
         """Draw the start, the first passes half by half, and the end.
@@ -166,7 +169,7 @@ class PassTrace(Plotted):
             Width and height of the film [inches].
         """
         require("pictures", "matplotlib", "plot")
-        drawn(self, 0, path, seconds, view=view, size=size)
+        drawn(self, 1, path, seconds, view=view, size=size)
 
 
 def trace(
@@ -190,12 +193,12 @@ def trace(
     start : Solution or array (nq,), optional
         Start as in `solve_ik`.
     most : int, optional
-        Passes after which the trace ends, whatever they have reached.
+        Passes after which the trace ends, whatever they have reached (`is_cut`).
 
     Raises
     ------
     UnsupportedMechanism
-        Joint positions do not express the mechanism.
+        Joint positions do not express the mechanism, or its task leaves a part of the pose open.
     InvalidArgument
         Several targets; options of a method that makes no plain passes.
     """
@@ -206,6 +209,8 @@ def trace(
     targets, shape = as_targets(mechanism, target)
     if shape or not are_poses(targets).all():
         raise InvalidArgument("target", f"batch shape {shape}" if shape else "no pose", "one pose")
+    if mechanism.task != mechanism.whole_task:
+        raise UnsupportedMechanism(mechanism.name, ("passes set the whole pose, which its task does not",))
     compiled, model = with_rules(compile_plan(mechanism), options), model_of(mechanism)
     wanted = clip_targets(mechanism, made_exact(targets))
     pose = wanted[0].copy()
@@ -217,7 +222,9 @@ def trace(
     P.load_seed(compiled.plan, seeds, 0, config)
     copy_table(pose, config.pose)
     stages = tuple(_stages(compiled.plan, config, settings, most))
-    return PassTrace(mechanism, targets[0].copy(), stages, settings.tolerance)
+    trace = PassTrace(mechanism, targets[0].copy(), stages, settings.tolerance, is_cut=False)
+    goes_on = trace.rounds < settings.max_rounds or stages[-1].iteration < settings.max_iterations
+    return replace(trace, is_cut=trace.passes >= most and not trace.is_reached and goes_on)
 
 
 def _stages(plan: P.Plan, config: P.Configuration, settings: P.Settings, most: int) -> Iterator[Stage]:

@@ -90,6 +90,7 @@ def _panels(trace: PassTrace, plan: Plan, passes: int) -> Iterator[PassPanel]:
     if chains <= ONE_BY_ONE:
         for stage in first[1:]:
             name = f"{WORDS[stage.kind]}, {stage.chain + 1}" if chains > 1 else WORDS[stage.kind]
+            name += f" (pass {stage.iteration})" if passes > 1 else ""
             yield PassPanel(name, before, stage, frozenset([stage.chain]))
             before = stage
     else:
@@ -99,7 +100,8 @@ def _panels(trace: PassTrace, plan: Plan, passes: int) -> Iterator[PassPanel]:
                 alike = [stage for stage in ones if stage.kind == kind]
                 if alike:
                     together = _together(plan, before, alike)
-                    yield PassPanel(WORDS[kind], before, together, everything)
+                    name = WORDS[kind] + (f" (pass {number})" if passes > 1 else "")
+                    yield PassPanel(name, before, together, everything)
                     before = together
     last = trace.stages[-1]
     told = f"{trace.passes} passes" if trace.passes != 1 else "1 pass"
