@@ -53,8 +53,8 @@ def solve_fk(
     Returns
     -------
     Solution
-        As of `pfabrik.solve_fk`; `iterations` are passes. Where passes do not end within E, or do beyond a limit, Newton's
-        method answers from the start, and `rounds` is -1 (`by_fallback`).
+        As of `pfabrik.solve_fk`; `iterations` are passes. Where passes do not end within E, or do so beyond a limit,
+        Newton's method answers from the start, and `rounds` is -1 (`by_fallback`).
 
     Raises
     ------
