@@ -73,3 +73,27 @@ def solve_square(A: Floats, n: int) -> bool:
             entry -= A[j, k] * A[k, n]
         A[j, n] = entry / A[j, j]
     return True
+
+
+@routine
+def sign_of_square(A: Floats, n: int) -> int:
+    """The sign of det A[:n, :n], by Gaussian elimination with partial pivoting; A is overwritten."""
+    sign = 1
+    for j in range(n):
+        best = j
+        for i in range(j + 1, n):
+            if abs(A[i, j]) > abs(A[best, j]):
+                best = i
+        if not abs(A[best, j]) > 0.0:
+            return 0
+        if best != j:
+            sign = -sign
+            for k in range(j, n):
+                A[j, k], A[best, k] = A[best, k], A[j, k]
+        if A[j, j] < 0.0:
+            sign = -sign
+        for i in range(j + 1, n):
+            factor = A[i, j] / A[j, j]
+            for k in range(j + 1, n):
+                A[i, k] -= factor * A[j, k]
+    return sign

@@ -13,7 +13,7 @@ from ...common.batch import put, take
 from ...common.derived import derived
 from ...kernels.joints.joint_constants import ASSEMBLY_STARTS, LONGEST_SEARCH, NEAR_VALUES, NOISE, PROJECTIONS, SAME_GAP
 from ...kernels.rows import ACTUATOR_ERROR, EXCEEDED, FAILED, PROJECTED, REACHED
-from ...kernels.search_constants import MOST_STEPS
+from ...kernels.search_constants import BELIEVED, MOST_STEPS
 from ...machine.motion.loops import Closure
 from ...machine.motion.mobility import generic_of
 from ...tolerances import TOLERANCES
@@ -22,6 +22,10 @@ from .configurations import Configurations
 from .descend import nearest_actuators
 from .effort import continued, descents_within
 from .multistart import same_random_starts
+
+
+TANGENT, NOTHING = 1e-4, 1e-6
+"""Part of the way whose closing is the motion's tangent; way of the passive joints that may be left whatever it is."""
 
 
 def assemble(
@@ -106,12 +110,39 @@ def is_over_determined(closure: Closure) -> bool:
 
 
 def _locked(closure: Closure, coordinates: Floats, poses: Floats, values: Floats, *, stays: bool = False) -> Closing:
-    """Close the loops by Newton's method with the actuators locked at values (n, n_a); `stays` as of `close`."""
+    """Close the loops by Newton's method with the actuators locked at values (n, n_a); `stays` as of `_follow`."""
+    if stays:
+        return _follow(closure, coordinates, values)
     start = coordinates.copy()
     closure.put_actuators(start, values)
-    if stays:  # joints that carry all of the loops take the platform along
-        poses = platform_poses(closure.mechanism, start)
-    return close(closure, start, poses, locked=closure.driven, stays=stays)
+    return close(closure, start, poses, locked=closure.driven)
+
+
+def _follow(closure: Closure, coordinates: Floats, values: Floats) -> Closing:
+    """Close the loops where the actuators lead from a start (n, columns) to values (n, n_a); else gaps are infinite.
+
+    The passive joints go along the motion's tangent at the start, which Newton's method finds from a small part of the
+    way. Then its steps must contract, and undo no more than a share of the tangent: `BELIEVED`.
+    """
+    start = coordinates.copy()
+    closure.put_actuators(start, values)
+    change = start - coordinates
+    part = coordinates + TANGENT * change
+    begun = close(
+        closure, part, platform_poses(closure.mechanism, part), locked=closure.driven, stays=True, max_iterations=1
+    )
+    tangent = np.where(np.isfinite(begun.coordinates), (begun.coordinates - coordinates) / TANGENT, 0.0)
+    tangent[:, list(closure.driven)] = change[:, list(closure.driven)]
+    predicted = coordinates + tangent
+    closing = close(closure, predicted, platform_poses(closure.mechanism, predicted), locked=closure.driven, stays=True)
+    passive = np.ones(closure.scale.shape, bool)
+    passive[list(closure.driven)] = False
+    size, left = (
+        np.linalg.norm((each * closure.scale)[:, passive], axis=1)
+        for each in (tangent, closing.coordinates - predicted)
+    )
+    closing.gaps[~(left <= BELIEVED * np.maximum(size, NOTHING))] = np.inf
+    return closing
 
 
 def _continue_to(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:

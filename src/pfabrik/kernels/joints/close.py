@@ -13,7 +13,7 @@ from typing import NamedTuple
 from ...common.arrays import Floats
 from .._jit import inlined, opener, routine, search
 from ..quaternions import exponential, turn_about_z, turn_ball, yaw_of
-from ..search_constants import CONTRACTION, NEWTON_STEP
+from ..search_constants import BELIEVED, CONTRACTION, FARTHEST_OPENING, NEWTON_STEP
 from .joint_constants import DAMPING, FEW, LEAST_DAMPING, MOST_DAMPING
 from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, Closed, ClosureProblem, Layout, Loops
 from .normal_equations import (
@@ -228,6 +228,15 @@ def is_close(problem: ClosureProblem, eq: Equations) -> bool:
 
 
 @inlined
+def largest_gap(eq: Equations) -> float:
+    """The largest gap of all groups of paths [L or rad]."""
+    largest = 0.0
+    for group in range(len(eq.gaps)):
+        largest = max(largest, eq.gaps[group])
+    return largest
+
+
+@inlined
 def least_damping(layout: Layout) -> float:
     """The least damping for the size of the largest group."""
     largest = FEW
@@ -280,6 +289,8 @@ def close_row(
                 copy_state(best, trial)
         elif phase == RETURN:
             phase = TRY
+        if problem.stays == 1 and iterations == 0 and largest_gap(eq) > FARTHEST_OPENING:
+            phase = MEASURE
         damping = least if undamped else max(least, DAMPING * factor * min(cost, 1.0))
         if phase == TRY and (iterations == problem.max_iterations or not damping < MOST_DAMPING):
             phase = MEASURE
@@ -294,7 +305,7 @@ def close_row(
             iterations += 1
             if problem.stays == 1 and not step <= longest_step:
                 phase = MEASURE
-            longest_step = CONTRACTION * step
+            longest_step = (BELIEVED if iterations == 1 else CONTRACTION) * step
         if phase == MEASURE:
             if problem.balls_follow == 1:
                 follow_platform(loops, best, eq)

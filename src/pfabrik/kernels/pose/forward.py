@@ -19,9 +19,9 @@ from ..legs.complete_poses import middle_of, orthonormalise, turn_pose
 from ..legs.endings import turned
 from ..legs.leg_constants import KEPT
 from ..legs.records import CRANK, FROM_BASE, Q_PROXIMAL, SAMPLE, Table, open_table
-from ..linear import solve_spd, solve_square
+from ..linear import sign_of_square, solve_spd, solve_square
 from ..rows import EXCEEDED, LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
-from ..search_constants import CONTRACTION, NEWTON_STEP, SHORTEST_SHARE
+from ..search_constants import BELIEVED, CONTRACTION, FARTHEST_TURN, NEWTON_STEP, SHORTEST_SHARE
 from ..sqp import longest
 from ..vectors import add, copy_row, copy_table, cross, put, scale, sub, turn, vec, wrap
 from ..vectors import move as moved
@@ -38,7 +38,7 @@ from .limits import coordinate_slope, is_multiturn
 from .pose_constants import ASSEMBLED, FARTHEST_VALUE, FORWARD_STEPS, NEARLY_ASSEMBLED, ON_THE_WAY
 from .search import copy_platform_state, move
 from .search_records import Starts
-from .spheres import Spheres, new_spheres, put_spheres, set_spheres
+from .spheres import Spheres, new_spheres, put_sphere_errors, put_spheres, set_spheres
 from .starts import place_proximal, put_sides
 
 
@@ -49,6 +49,7 @@ class NewtonScratch(NamedTuple):
     free: Ints  # (m,): indices of the unknowns
     equations: Floats  # (e, m + 1): equations in these, right-hand side last
     normal: Floats  # (m, m + 1): normal equations
+    first: Floats  # (e, m + 1): the equations where Newton's method began, the actuators as they were there
     step: Floats  # (n,)
     values: Floats  # (n_a,): deviations from home that the actuators are to have
     start_values: Floats  # (n_a,): deviations from home where a continuation starts
@@ -83,6 +84,7 @@ def new_newton_scratch(table: Table, turns: bool) -> NewtonScratch:
         free,
         np.zeros((n_equations, m + 1)),
         np.zeros((m, m + 1)),
+        np.zeros((n_equations, m + 1)),
         np.zeros(n),
         np.zeros(n_driven),
         np.zeros(n_driven),
@@ -101,19 +103,66 @@ def drives_proximal(table: Table, i: int) -> bool:
 
 
 @routine
-def place_drivers(table: Table, scratch: NewtonScratch) -> None:
-    """Put actuated proximal and redundant joints at their values.
+def opens_loops(table: Table, i: int) -> bool:
+    """True if an actuator drives a proximal or redundant joint that does not carry all legs."""
+    return drives_proximal(table, i) and not carries_all(table, table.driven[i]["leg"])
 
-    A joint that carries all legs takes the platform along, or turns it on its carrier: the loops stay as they are.
+
+@routine
+def place_carriers(table: Table, scratch: NewtonScratch) -> bool:
+    """Put actuated joints that carry all legs at their values; True if other proximal joints are actuated.
+
+    These take the platform along, or turn it on its carrier: the loops stay as they are.
     """
-    q = scratch.state.q
+    q, has_others = scratch.state.q, False
     for i in range(table.driven.shape[0]):
-        if drives_proximal(table, i):
+        if opens_loops(table, i):
+            has_others = True
+        elif drives_proximal(table, i):
             k = table.driven[i]["leg"]
             value = table.driven[i]["sense"] * scratch.values[table.driven[i]["column"]]
-            if carries_all(table, k):
-                take_platform_along(table, k, value - q[k], scratch.state)
+            take_platform_along(table, k, value - q[k], scratch.state)
             q[k] = value
+    return has_others
+
+
+@routine
+def place_drivers(table: Table, scratch: NewtonScratch) -> float:
+    """Put the other actuated proximal and redundant joints at their values; the largest change [L or rad]."""
+    q, largest = scratch.state.q, 0.0
+    for i in range(table.driven.shape[0]):
+        if opens_loops(table, i):
+            k = table.driven[i]["leg"]
+            value = table.driven[i]["sense"] * scratch.values[table.driven[i]["column"]]
+            change = wrap(value - q[k], 0.0) if table.driven[i]["turns"] == 1 else value - q[k]
+            largest = max(largest, abs(change))
+            q[k] = value
+    return largest
+
+
+@routine
+def put_first_equations(table: Table, scratch: NewtonScratch) -> None:
+    """Fill the left-hand sides at the current configuration, whose actuators are not yet at their values."""
+    if has_spheres(scratch):
+        set_spheres(table, scratch.values, scratch.state, scratch.leg_eval, scratch.spheres)
+        put_spheres(scratch.state.pose, scratch.spheres, scratch.equations)
+    else:
+        evaluate_legs(table, scratch.state, scratch.leg_eval)
+        put_equations(table, scratch)
+    copy_table(scratch.equations, scratch.first)
+
+
+@routine
+def has_crossed(scratch: NewtonScratch) -> bool:
+    """True if det J0'J1 is not positive, with the slopes J0 at the start and J1 now: a singularity is between them."""
+    first, equations, normal = scratch.first, scratch.equations, scratch.normal
+    m = normal.shape[0]
+    for a in range(m):
+        for b in range(m):
+            normal[a, b] = 0.0
+            for e in range(equations.shape[0]):
+                normal[a, b] += first[e, a] * equations[e, b]
+    return sign_of_square(normal, m) <= 0
 
 
 @routine
@@ -248,19 +297,29 @@ def newton(table: Table, assembled: float, stays: bool, scratch: NewtonScratch) 
     Parameters
     ----------
     assembled : residual that ends the iteration [L or rad].
-    stays : end with an infinite residual if steps do not contract, as of `CONTRACTION`.
+    stays : end with an infinite residual if the platform does not follow the actuators: where they place rods, if one
+        goes farther than `FARTHEST_TURN`, if the first step, by the slopes at the start, leaves more than `BELIEVED`
+        says, or if a singularity is between start and end; elsewhere if steps do not contract, as of `CONTRACTION`.
     """
     free, normal, step = scratch.free, scratch.normal, scratch.step
     m, previous, longest_step = free.shape[0], math.inf, math.inf
-    place_drivers(table, scratch)
+    follows = place_carriers(table, scratch) and stays
+    if follows:
+        put_first_equations(table, scratch)
+    if place_drivers(table, scratch) > FARTHEST_TURN and follows:
+        return math.inf
     if has_spheres(scratch):
         set_spheres(table, scratch.values, scratch.state, scratch.leg_eval, scratch.spheres)
     for iteration in range(FORWARD_STEPS):
-        worst = put_residuals(table, scratch)
+        by_first = follows and iteration == 0
+        if by_first and has_spheres(scratch):
+            worst = put_sphere_errors(scratch.state.pose, scratch.spheres, scratch.equations)
+        else:
+            worst = put_residuals(table, scratch)
         if not worst < math.inf or worst <= assembled or (worst <= NEARLY_ASSEMBLED and worst > 0.5 * previous):
-            return worst
+            return math.inf if follows and iteration > 0 and has_crossed(scratch) else worst
         is_near = iteration > 0 and worst * worst <= ASSEMBLED * previous  # another step with the same slopes suffices
-        if not is_near and not has_spheres(scratch):
+        if not is_near and not has_spheres(scratch) and not by_first:
             put_equations(table, scratch)
         if not solve_linear(scratch):
             return math.inf
@@ -273,7 +332,7 @@ def newton(table: Table, assembled: float, stays: bool, scratch: NewtonScratch) 
             return math.inf
         if stays and worst > NEARLY_ASSEMBLED and not math.sqrt(size) <= longest_step:
             return math.inf
-        longest_step = CONTRACTION * math.sqrt(size)
+        longest_step = (BELIEVED if by_first else CONTRACTION) * math.sqrt(size)
     return put_residuals(table, scratch)
 
 

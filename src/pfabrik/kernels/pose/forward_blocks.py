@@ -18,8 +18,8 @@ from ..legs.columns import PX, PY, PZ, XX, XY, XZ, YX, YY, YZ, ZX, ZY, ZZ
 from ..legs.records import COSINE, N_VALUES, Q_PROXIMAL, SINE, Table, open_table
 from ..legs.rods import base_end_of
 from ..rows import PENDING, REACHED, RESIDUAL
-from ..search_constants import CONTRACTION, NEWTON_STEP
-from ..vectors import Vec, add, along, copy_row, cross, dot, move, scale, sub, vec
+from ..search_constants import BELIEVED, CONTRACTION, FARTHEST_TURN, NEWTON_STEP
+from ..vectors import Vec, add, along, copy_row, cross, dot, move, scale, sub, vec, wrap
 from .equations import owner_of
 from .forward import open_starts, put_deviations
 from .pose_constants import ASSEMBLED, BLOCK_STEPS, NEARLY_ASSEMBLED
@@ -67,6 +67,10 @@ def fill_block(
         for a in range(table.driven.shape[0]):
             k, change = table.driven[a]["leg"], table.driven[a]["sense"] * deviations[i, table.driven[a]["column"]]
             if table.driven[a]["place"] == Q_PROXIMAL:
+                if starts.q.shape[0] > 0:
+                    turn = change - starts.q[own, k]
+                    if abs(wrap(turn, 0.0) if table.driven[a]["turns"] == 1 else turn) > FARTHEST_TURN:
+                        S[STATE, i] = FAILED
                 q[k], values[k, Q_PROXIMAL], values[k, COSINE], values[k, SINE] = (
                     change,
                     change,
@@ -168,8 +172,13 @@ def series(a: tuple[float, ...], x: float) -> float:
 
 
 @routine
-def take_steps(centre: Vec, n: int, S: Floats) -> None:
-    """Take the steps of columns that go on; where steps do not contract, or are too long, a column fails."""
+def take_steps(centre: Vec, n: int, share: float, S: Floats) -> None:
+    """Take the steps of columns that go on; where steps do not contract, or are too long, a column fails.
+
+    Parameters
+    ----------
+    share : of these steps that the next ones are at most long.
+    """
     for i in range(n):
         a, b, c = (S[XX, i], S[YX, i], S[ZX, i]), (S[XY, i], S[YY, i], S[ZY, i]), (S[XZ, i], S[YZ, i], S[ZZ, i])
         v, w, worst, state = three(VX, i, S), three(WX, i, S), S[WORST, i], S[STATE, i]
@@ -179,7 +188,7 @@ def take_steps(centre: Vec, n: int, S: Floats) -> None:
         is_short = is_short & (abs(w[0]) <= NEWTON_STEP) & (abs(w[1]) <= NEWTON_STEP) & (abs(w[2]) <= NEWTON_STEP)
         moves = (state == GOING) & is_short & ((size <= S[LONGEST, i]) | (worst <= NEARLY_ASSEMBLED))
         S[STATE, i] = state if moves | (state == DONE) else FAILED
-        S[PREVIOUS, i], S[LONGEST, i], S[WORST, i] = worst, CONTRACTION * size, (0.0 if moves else worst)
+        S[PREVIOUS, i], S[LONGEST, i], S[WORST, i] = worst, share * size, (0.0 if moves else worst)
         S[PX, i] += v[0] if moves else 0.0
         S[PY, i] += v[1] if moves else 0.0
         S[PZ, i] += v[2] if moves else 0.0
@@ -209,7 +218,9 @@ def assemble_in_blocks(
     places : the place of each rod; the lines of the three at first places span space.
     """
     table, starts, n_left, n_rows = open_table(machine), open_starts(starts_address), 0, values.shape[0]
-    poses = ends.poses
+    poses, places_rods = ends.poses, False
+    for a in range(table.driven.shape[0]):
+        places_rods = places_rods or table.driven[a]["place"] == Q_PROXIMAL
     length, centre = table.task[0]["length"], vec(table.task[0]["centre"])
     S, leg_values = np.empty((RODS + 6 * OF_ROD, COLUMNS)), np.zeros((6, N_VALUES))
     found, actuators = np.empty(n_rows, np.int64), np.empty((n_rows, values.shape[1]))
@@ -218,14 +229,14 @@ def assemble_in_blocks(
         for row in range(first, first + n):
             put_deviations(table, values[row], deviations[row])
         fill_block(table, places, deviations[first : first + n], starts, first, S, leg_values, ends)
-        for _step in range(BLOCK_STEPS):
+        for step in range(BLOCK_STEPS):
             for k in range(6):
                 rod = RODS + OF_ROD * places[k]
                 fill_rod(vec(table.legs[k]["platform_end_point"]), centre, n, S, S[rod : rod + OF_ROD])
             if note_assembled(n, S) == 0:
                 break
             solve_steps(n, S)
-            take_steps(centre, n, S)
+            take_steps(centre, n, BELIEVED if places_rods and step == 0 else CONTRACTION, S)
         for i in range(n):
             pose, status[first + i] = poses[first + i], REACHED if S[STATE, i] == DONE else PENDING
             for j in range(3):

@@ -17,7 +17,7 @@ from ..legs.frames import AXES, set_frames
 from ..legs.kinds import place_frame
 from ..legs.records import COSINE, FROM_BASE, HINGE, IDLE, NO_PROXIMAL, PIVOT, Q_PROXIMAL, ROD, SINE, SLIDE, Table
 from ..legs.rods import base_end_of
-from ..vectors import add, cross, dot, put, scale, sub, turn, vec
+from ..vectors import add, cross, dot, norm, put, scale, sub, turn, vec
 from .equations import LegEvaluation, PlatformState, has_proximal, owner_of
 
 
@@ -99,5 +99,17 @@ def put_spheres(pose: Floats, spheres: Spheres, equations: Floats) -> float:
         if m > 3:
             put(equation[3:], cross(lever, u))
         equation[m] = -off
+        worst = max(worst, abs(off)) if abs(off) < math.inf else math.inf
+    return worst
+
+
+@routine
+def put_sphere_errors(pose: Floats, spheres: Spheres, equations: Floats) -> float:
+    """Fill the right-hand sides of the equations alone, as `put_spheres` does."""
+    platform_ends, base_ends, lengths, worst = spheres.platform_ends, spheres.base_ends, spheres.lengths, 0.0
+    p, m = (pose[0, 3], pose[1, 3], pose[2, 3]), equations.shape[1] - 1
+    for e in range(lengths.shape[0]):
+        off = norm(sub(add(turn(pose, vec(platform_ends[e])), p), vec(base_ends[e]))) - lengths[e]
+        equations[e, m] = -off
         worst = max(worst, abs(off)) if abs(off) < math.inf else math.inf
     return worst
