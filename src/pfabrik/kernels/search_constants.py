@@ -10,9 +10,9 @@ CONTRACTION = 0.5
 none is shortened: the start is then in the ball around the solution in which there is no other (Kantorovich)."""
 
 BELIEVED, FARTHEST_TURN, FARTHEST_OPENING = 0.25, 0.5, 0.25
-"""That solution need not be the one to which the motion leads, for actuators jump while the platform stays. So the second
-step is at most this share of the first, which has the slopes of the start where actuators place rods; no actuator that
-places rods goes farther than so much at once [rad or L], and none opens loops farther than so much [L or rad]."""
+"""That solution need not be the one to which the motion leads, for actuators jump while the platform stays. So the
+second step is at most this share of the first, which has the slopes of the start where actuators place rods. No such
+actuator goes farther than so much at once [rad or L], and none opens loops farther than so much [L or rad]."""
 
 SHORTEST_SHARE = 1.0 / 8192.0
 """Shortest step of a continuation, as a share of the way: where even that does not contract, a parallel singularity, or

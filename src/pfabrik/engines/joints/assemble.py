@@ -23,7 +23,6 @@ from .descend import nearest_actuators
 from .effort import continued, descents_within
 from .multistart import same_random_starts
 
-
 TANGENT, NOTHING = 1e-4, 1e-6
 """Part of the way whose closing is the motion's tangent; way of the passive joints that may be left whatever it is."""
 
