@@ -97,3 +97,20 @@ def sign_of_square(A: Floats, n: int) -> int:
             for k in range(j + 1, n):
                 A[i, k] -= factor * A[j, k]
     return sign
+
+
+@routine
+def least_pivot(A: Floats, n: int) -> float:
+    """The least pivot of a positive semidefinite matrix A[:n, :n], as a share of its largest entry; overwrites A."""
+    largest, least = 0.0, math.inf
+    for i in range(n):
+        largest = max(largest, A[i, i])
+    for j in range(n):
+        least = min(least, A[j, j])
+        if not A[j, j] > 0.0:
+            return 0.0
+        for i in range(j + 1, n):
+            factor = A[i, j] / A[j, j]
+            for k in range(j + 1, n):
+                A[i, k] -= factor * A[j, k]
+    return least / largest

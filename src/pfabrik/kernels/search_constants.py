@@ -14,6 +14,9 @@ BELIEVED, FARTHEST_TURN, FARTHEST_OPENING = 0.25, 0.5, 0.25
 second step is at most this share of the first, which has the slopes of the start where actuators place rods. No such
 actuator goes farther than so much at once [rad or L], and none opens loops farther than so much [L or rad]."""
 
+SINGULAR = 1e-10
+"""Least pivot of the squared slopes at a start, as a share of the largest, from which on actuators lead somewhere."""
+
 SHORTEST_SHARE = 1.0 / 8192.0
 """Shortest step of a continuation, as a share of the way: where even that does not contract, a parallel singularity, or
 a limit, ends the assembly mode."""

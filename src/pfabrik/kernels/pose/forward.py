@@ -19,9 +19,9 @@ from ..legs.complete_poses import middle_of, orthonormalise, turn_pose
 from ..legs.endings import turned
 from ..legs.leg_constants import KEPT
 from ..legs.records import CRANK, FROM_BASE, Q_PROXIMAL, SAMPLE, Table, open_table
-from ..linear import sign_of_square, solve_spd, solve_square
+from ..linear import least_pivot, sign_of_square, solve_spd, solve_square
 from ..rows import EXCEEDED, LIMIT_EXCESS, PENDING, REACHED, RESIDUAL
-from ..search_constants import BELIEVED, CONTRACTION, FARTHEST_TURN, NEWTON_STEP, SHORTEST_SHARE
+from ..search_constants import BELIEVED, CONTRACTION, FARTHEST_TURN, NEWTON_STEP, SHORTEST_SHARE, SINGULAR
 from ..sqp import longest
 from ..vectors import add, copy_row, copy_table, cross, put, scale, sub, turn, vec, wrap
 from ..vectors import move as moved
@@ -141,8 +141,11 @@ def place_drivers(table: Table, scratch: NewtonScratch) -> float:
 
 
 @routine
-def put_first_equations(table: Table, scratch: NewtonScratch) -> None:
-    """Fill the left-hand sides at the current configuration, whose actuators are not yet at their values."""
+def put_first_equations(table: Table, scratch: NewtonScratch) -> bool:
+    """Fill the left-hand sides at the current configuration, whose actuators are not yet at their values.
+
+    False at a parallel singularity, where the actuators lead nowhere in particular.
+    """
     if has_spheres(scratch):
         set_spheres(table, scratch.values, scratch.state, scratch.leg_eval, scratch.spheres)
         put_spheres(scratch.state.pose, scratch.spheres, scratch.equations)
@@ -150,11 +153,13 @@ def put_first_equations(table: Table, scratch: NewtonScratch) -> None:
         evaluate_legs(table, scratch.state, scratch.leg_eval)
         put_equations(table, scratch)
     copy_table(scratch.equations, scratch.first)
+    put_products(scratch)
+    return least_pivot(scratch.normal, scratch.normal.shape[0]) > SINGULAR
 
 
 @routine
-def has_crossed(scratch: NewtonScratch) -> bool:
-    """True if det J0'J1 is not positive, with the slopes J0 at the start and J1 now: a singularity is between them."""
+def put_products(scratch: NewtonScratch) -> None:
+    """Fill `normal` with J0'J1, of the slopes where Newton's method began and now."""
     first, equations, normal = scratch.first, scratch.equations, scratch.normal
     m = normal.shape[0]
     for a in range(m):
@@ -162,7 +167,13 @@ def has_crossed(scratch: NewtonScratch) -> bool:
             normal[a, b] = 0.0
             for e in range(equations.shape[0]):
                 normal[a, b] += first[e, a] * equations[e, b]
-    return sign_of_square(normal, m) <= 0
+
+
+@routine
+def has_crossed(scratch: NewtonScratch) -> bool:
+    """True if det J0'J1 is not positive, with the slopes J0 at the start and J1 now: a singularity is between them."""
+    put_products(scratch)
+    return sign_of_square(scratch.normal, scratch.normal.shape[0]) <= 0
 
 
 @routine
@@ -305,7 +316,7 @@ def newton(table: Table, assembled: float, stays: bool, scratch: NewtonScratch) 
     m, previous, longest_step = free.shape[0], math.inf, math.inf
     follows = place_carriers(table, scratch) and stays
     if follows:
-        put_first_equations(table, scratch)
+        follows = put_first_equations(table, scratch)
     if place_drivers(table, scratch) > FARTHEST_TURN and follows:
         return math.inf
     if has_spheres(scratch):
