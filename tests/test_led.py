@@ -184,3 +184,33 @@ def test_exported_forward_kinematics_goes_there_too(make: Callable[[], Mechanism
     told = answers.fk == 0
     assert np.isin(answers.fk[reached], (0, OTHER_MODE)).all() and (told & reached).sum() >= 5
     np.testing.assert_allclose(answers.back[told & reached], there[told & reached], atol=1e-6)
+
+
+def gripper(fingers: int) -> Mechanism:
+    """A slide, a rod for each finger, and pads on parallelograms: all come to their dead points at once."""
+    joints = [pf.Joint("slide", "prismatic", ("body", "carriage"), axis=(0, 1, 0), range=(-12, 12), actuated=True)]
+    for side, k in ((-1, "L"), (1, "R"))[:fingers]:
+        for name, x, y, inner, outer in (
+            ("rod0", 6, -10, "carriage", "rod"),
+            ("rod1", 26, 11, "rod", "driver"),
+            ("drv0", 16, 16, "body", "driver"),
+            ("drv1", 36, 62, "driver", "pad"),
+            ("fol0", 6, 21, "body", "follow"),
+            ("fol1", 26, 67, "follow", "pad"),
+        ):
+            bodies = [each if each in ("body", "carriage") else each + k for each in (inner, outer)]
+            joints.append(hinge(name + k, *bodies, np.array([side * x, y])))
+    return Mechanism("gripper", joints, "padL", (-30, 92, 0), base="body", task=("x",))
+
+
+def test_dead_points_of_several_loops_at_once_are_dead_points() -> None:
+    """A second finger, which mirrors the first, takes nothing away and adds nothing, out and home again."""
+    xs = np.concatenate([np.arange(-30, 66), np.arange(65, -31, -1)])
+    targets = np.stack([xs, np.full(len(xs), 92.0), np.zeros(len(xs))], axis=1)
+    one, two = (pf.track(machine, targets, start=pf.solve_fk(machine, [0.0])) for machine in map(gripper, (1, 2)))
+    np.testing.assert_array_equal(one.status, two.status)
+    assert (one.status == Status.REACHED).any() and (one.status == Status.PROJECTED).any()
+    np.testing.assert_allclose(one.actuators, two.actuators, atol=1e-5)
+    assert two.status[-1] == Status.REACHED
+    reached = two.status == Status.REACHED  # at the dead point both are as near as a root of rounding
+    np.testing.assert_allclose(two.joints["drv0R"][reached], -two.joints["drv0L"][reached], atol=1e-6)

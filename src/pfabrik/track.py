@@ -27,7 +27,7 @@ from .kernels.rows import POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Ro
 from .machine.description.mechanism import Mechanism
 from .machine.description.task import task_of
 from .machine.model import model_of
-from .machine.motion.singularities import assembly_signs
+from .machine.motion.singularities import are_opposite, assembly_signs
 from .machine.poses import between
 from .options import Options, checked_options
 from .tolerances import TOLERANCES
@@ -128,10 +128,10 @@ def _kept_assembly(
     """The solutions along targets (n, 4, 4); rows beyond a dead point of a linkage stop at it, on the start's side."""
     engine, home = engine_of(mechanism), np.zeros((1, len(mechanism.coordinates)))
     kept = start or engine.as_configurations(measure_configurations(model_of(mechanism), home))
-    sign = float(assembly_signs(mechanism, kept.coordinates)[0])
-    if not sign:
+    signs = assembly_signs(mechanism, kept.coordinates)[0]
+    if not signs.any():
         return solutions
-    is_beyond = assembly_signs(mechanism, solutions.coordinates) * sign < 0.0
+    is_beyond = are_opposite(assembly_signs(mechanism, solutions.coordinates), signs)
     crossed = np.flatnonzero(is_beyond | (solutions.rows.status == PROJECTED))
     if not len(crossed):
         return solutions
@@ -141,26 +141,26 @@ def _kept_assembly(
     for row in range(crossed[0], len(targets)):  # the others were answered from a dead point, or beyond it
         target = targets[row : row + 1]
         answer = engine.answer(target, kept, options, keep_mode=True)
-        is_kept = assembly_signs(mechanism, answer.coordinates)[0] * sign > 0.0
+        is_kept = ((assembly_signs(mechanism, answer.coordinates)[0] * signs > 0.0) | (signs == 0.0)).all()
         if answer.rows.status[0] == REACHED and is_kept:
             kept = answer
         elif answer.rows.status[0] <= PROJECTED and not is_kept:
-            answer = _up_to_dead_point(mechanism, target, kept, sign, options)
+            answer = _up_to_dead_point(mechanism, target, kept, signs, options)
         put(solutions.rows, [row], answer.rows)
         solutions.coordinates[row] = answer.coordinates[0]
     return solutions
 
 
 def _up_to_dead_point(
-    mechanism: Mechanism, target: Floats, start: Configurations, sign: float, options: Options
+    mechanism: Mechanism, target: Floats, start: Configurations, signs: Floats, options: Options
 ) -> Configurations:
-    """The last configuration with the start's sign of assembly on the straight way to a target (1, 4, 4)."""
+    """The last configuration with the start's signs of assembly on the straight way to a target (1, 4, 4)."""
     engine, begin, kept = engine_of(mechanism), start.rows.poses.copy(), start.at(np.zeros(1, int))
 
     def advance(_rows: NDArray[np.intp], shares: Floats) -> Mask:
         nonlocal kept
         there = engine.advance(between(begin, target, shares), kept)
-        is_kept = (there.rows.status == REACHED) & (assembly_signs(mechanism, there.coordinates) * sign >= 0.0)
+        is_kept = (there.rows.status == REACHED) & ~are_opposite(assembly_signs(mechanism, there.coordinates), signs)
         kept = there if is_kept[0] else kept
         return np.asarray(is_kept)
 

@@ -25,7 +25,7 @@ from .machine.description.mechanism import Mechanism
 from .machine.description.task import task_of
 from .machine.model import model_of
 from .machine.motion.fitting_task import has_dependent_coordinates, task_remark, tilt_axis
-from .machine.motion.singularities import assembly_signs
+from .machine.motion.singularities import are_opposite, assembly_signs
 from .tolerances import TOLERANCES
 
 STEP = 1.0 / 32.0
@@ -295,7 +295,7 @@ class _TravelSearch:
     ----------
     directions : unit vectors (n, 3): lines first, then axes.
     farthest : the farthest configuration reached yet in each direction, (n,).
-    sign : of the assembly that is kept, as of `assembly_signs`; 0 if there is none to keep.
+    signs : of the assembly that is kept, as of `assembly_signs`.
     """
 
     def __init__(self, solution: Solution, lines: Floats, axes: Floats, pivot: Floats) -> None:
@@ -307,10 +307,8 @@ class _TravelSearch:
         rows = np.arange(len(self.directions))
         start = solution._configurations.at(0 * rows)
         self.farthest = self._engine.advance(self._targets(rows, np.zeros(len(rows))), start)
-        self._mechanism, self.sign = (
-            solution.mechanism,
-            float(assembly_signs(solution.mechanism, solution._coordinates)[0]),
-        )
+        self._mechanism = solution.mechanism
+        self.signs = assembly_signs(solution.mechanism, solution._coordinates)[0]
 
     def run(self) -> Floats:
         """Distance in each direction, (n,) [length or rad].
@@ -348,8 +346,8 @@ class _TravelSearch:
         """True for directions whose pose at the given distance is reached; the next step starts there."""
         solutions = self._engine.advance(self._targets(rows, distances), self.farthest.at(rows))
         reached = np.asarray(solutions.rows.status == REACHED)
-        if self.sign:
-            reached &= assembly_signs(self._mechanism, solutions.coordinates) * self.sign >= 0.0
+        if self.signs.any():
+            reached &= ~are_opposite(assembly_signs(self._mechanism, solutions.coordinates), self.signs)
         self.farthest.put(rows[reached], solutions, reached)
         return reached
 

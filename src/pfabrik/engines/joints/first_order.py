@@ -18,7 +18,7 @@ from ...machine.model import Model
 from ...machine.motion.displacements import rate_units
 from ...machine.motion.loops import actuated_columns, cycle_basis, present_screws
 from ...machine.motion.mobility import generic_of
-from ...machine.motion.singularities import Singularity, loop_basis, singularity_of
+from ...machine.motion.singularities import Singularity, loop_blocks, singularity_of
 from ...tolerances import TOLERANCES
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def are_stretched(model: Model, q: Floats) -> Mask:
 
 def is_at_dead_point(model: Model, q: Floats) -> bool:
     """True if a linkage with one freedom is at a dead point of its drive or a change point at coordinates q (1, c)."""
-    if not len(loop_basis(model.mechanism)[0]):
+    if not loop_blocks(model.mechanism):
         return False
     distances = singularities(model, q)
     return bool(np.minimum(distances.parallel, distances.constraint)[0] < TOLERANCES.stretched)

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import compress
-from typing import Any
+from itertools import combinations, compress
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Floats
+from ...common.arrays import Floats, Ints, Mask
 from ...common.derived import derived
 from ...common.printed import Printed, ResultTable, plain
 from ...tolerances import TOLERANCES
@@ -25,7 +25,7 @@ from ..description.home_mobility import column_moves
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from .displacements import displacements
-from .loops import actuated_columns, first_order
+from .loops import actuated_columns, loop_slopes
 from .mobility import around_home, generic_of
 
 KINDS = ("serial", "parallel", "constraint", "passive")
@@ -142,28 +142,85 @@ def _unit(vectors: Floats) -> Floats:
 
 
 def assembly_signs(mechanism: Mechanism, q: Floats) -> Floats:
-    """The sign of det C_P of a linkage with one freedom at coordinates q (n, c), (n,); 0 at a dead point or if unknown.
+    """Signs of det C_b of a linkage with one freedom at coordinates q (n, c), (n, blocks); 0 at dead points.
 
-    C_P are the loop conditions in the joints that are not driven: where it is singular, at dead points of the drive and
-    at change points, these may go on in either of two modes. It is known if the driven joint is the only freedom, and
-    the independent conditions are the same everywhere, as of loops in a plane.
+    C_b are the loop conditions of a block in the joints that follow from these loops, as joints of earlier blocks are
+    where they are: where it is singular, at dead points and change points, these may go on in either of two modes. Each
+    block has a sign of its own, for that of a product stays where two change at once. No blocks where none is known.
     """
-    basis, passive = loop_basis(mechanism)
-    if not len(basis) or not len(q):
-        return np.zeros(len(q))
+    blocks = loop_blocks(mechanism)
+    if not len(blocks) or not len(q):
+        return np.zeros((len(q), len(blocks)))
     invalid = np.asarray(np.isnan(q).any(axis=1))
-    closure, _ = first_order(mechanism, np.where(invalid[:, None], 0.0, q))
-    return np.asarray(np.where(invalid, 0.0, np.sign(np.linalg.det(basis @ closure[:, :, passive]))))
+    conditions = loop_slopes(mechanism, np.where(invalid[:, None], 0.0, q))
+    signs = [np.sign(np.linalg.det(block.basis @ conditions[:, block.rows][:, :, block.columns])) for block in blocks]
+    return np.asarray(np.where(invalid[:, None], 0.0, np.stack(signs, axis=1)))
+
+
+def are_opposite(signs: Floats, kept: Floats) -> Mask:
+    """True for rows of signs (n, blocks) of which one is the opposite of that which is kept, (blocks,): (n,)."""
+    return np.asarray((signs * kept < 0.0).any(axis=1))
+
+
+class LoopBlock(NamedTuple):
+    """Loops that, once the joints of earlier blocks are placed, place as many more as they have conditions.
+
+    Attributes
+    ----------
+    rows, columns : their conditions, and these joints, as of `loop_slopes`.
+    basis : orthonormal combinations of the conditions that are independent everywhere, as many as joints.
+    """
+
+    rows: Ints
+    columns: Ints
+    basis: Floats
 
 
 @derived
-def loop_basis(mechanism: Mechanism) -> tuple[Floats, list[int]]:
-    """Orthonormal combinations of loop conditions, independent everywhere, and the columns of passive joints."""
+def loop_blocks(mechanism: Mechanism) -> tuple[LoopBlock, ...]:
+    """The blocks of a linkage whose driven joint is its only freedom, from the drive outward; none of others.
+
+    They are Assur's groups. None either where the independent conditions are not the same everywhere, as they are of
+    loops in a plane.
+    """
     generic, actuated = generic_of(mechanism), actuated_columns(mechanism)
-    passive = [k for k in np.flatnonzero(column_moves(mechanism) > 0.0).tolist() if k not in actuated]
-    if generic.mobility.platform != 1 or len(actuated) != 1 or len(passive) != generic.rank:
-        return np.zeros((0, 0)), passive
-    closure, _ = first_order(mechanism, around_home(mechanism))
-    left, sizes, _ = np.linalg.svd(np.concatenate(list(closure), axis=1), full_matrices=False)
-    basis = left[:, sizes > TOLERANCES.alignment].T
-    return (basis if len(basis) == generic.rank else np.zeros((0, 0))), passive
+    passive = np.setdiff1d(np.flatnonzero(column_moves(mechanism) > 0.0), actuated)
+    if not len(passive) or generic.mobility.platform != 1 or len(actuated) != 1 or len(passive) != generic.rank:
+        return ()
+    conditions = loop_slopes(mechanism, around_home(mechanism))
+    joints = conditions.reshape(len(conditions), -1, 6, conditions.shape[2])
+    is_on = np.abs(joints).max(axis=(0, 2)) > TOLERANCES.alignment  # (loops, joints)
+    left, blocks = np.flatnonzero(is_on[:, passive].any(axis=1)), list[LoopBlock]()
+    while len(left):
+        block = _next_block(conditions, is_on, left, passive)
+        if block is None:
+            return ()
+        blocks.append(block)
+        left, passive = np.setdiff1d(left, block.rows // 6), np.setdiff1d(passive, block.columns)
+    return tuple(blocks) if not len(passive) else ()
+
+
+def _next_block(conditions: Floats, is_on: Mask, left: Ints, passive: Ints) -> LoopBlock | None:
+    """The smallest block of the loops that are left, whose joints are among those not yet placed."""
+    for size in range(1, min(len(left), MOST_TOGETHER) + 1):
+        for chosen in combinations(left.tolist(), size):
+            block = _block(conditions, is_on, np.array(chosen), passive)
+            if block is not None:
+                return block
+    return _block(conditions, is_on, left, passive)
+
+
+def _block(conditions: Floats, is_on: Mask, loops: Ints, passive: Ints) -> LoopBlock | None:
+    """The block of some loops, if they place as many joints as they have independent conditions."""
+    columns = passive[is_on[loops][:, passive].any(axis=0)]
+    if len(columns) > 6 * len(loops):
+        return None
+    rows = (6 * loops[:, None] + np.arange(6)).ravel()
+    together = np.concatenate(list(conditions[:, rows][:, :, columns]), axis=1)
+    directions, sizes, _ = np.linalg.svd(together, full_matrices=False)
+    basis = directions[:, sizes > TOLERANCES.alignment].T
+    return LoopBlock(rows, columns, basis) if len(basis) == len(columns) else None
+
+
+MOST_TOGETHER = 4
+"""Most loops that are tried together before all that are left are."""
