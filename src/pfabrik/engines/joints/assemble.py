@@ -111,13 +111,13 @@ def is_over_determined(closure: Closure) -> bool:
 def _locked(closure: Closure, coordinates: Floats, poses: Floats, values: Floats, *, stays: bool = False) -> Closing:
     """Close the loops by Newton's method with the actuators locked at values (n, n_a); `stays` as of `_follow`."""
     if stays:
-        return _follow(closure, coordinates, values)
+        return _follow(closure, coordinates, poses, values)
     start = coordinates.copy()
     closure.put_actuators(start, values)
     return close(closure, start, poses, locked=closure.driven)
 
 
-def _follow(closure: Closure, coordinates: Floats, values: Floats) -> Closing:
+def _follow(closure: Closure, coordinates: Floats, poses: Floats, values: Floats) -> Closing:
     """Close the loops where the actuators lead from a start (n, columns) to values (n, n_a); else gaps are infinite.
 
     The passive joints go along the motion's tangent at the start, which Newton's method finds from a small part of the
@@ -127,9 +127,7 @@ def _follow(closure: Closure, coordinates: Floats, values: Floats) -> Closing:
     closure.put_actuators(start, values)
     change = start - coordinates
     part = coordinates + TANGENT * change
-    begun = close(
-        closure, part, platform_poses(closure.mechanism, part), locked=closure.driven, stays=True, max_iterations=1
-    )
+    begun = close(closure, part, poses, locked=closure.driven, stays=True, max_iterations=1)
     tangent = np.where(np.isfinite(begun.coordinates), (begun.coordinates - coordinates) / TANGENT, 0.0)
     tangent[:, list(closure.driven)] = change[:, list(closure.driven)]
     predicted = coordinates + tangent
