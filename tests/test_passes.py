@@ -202,11 +202,11 @@ def turned_into(axis: np.ndarray, half_angle: float, b: np.ndarray) -> np.ndarra
 
 def test_a_pass_of_the_paper_is_its_formulas_on_a_strut_between_two_cones() -> None:
     """Its clamp of d and of both joints' angles, inward (the platform's joints) and outward, and its centroid."""
-    mechanism, half = pf.load("stewart"), np.radians(20.0)
+    mechanism, half, wide = pf.load("stewart"), *np.radians((20.0, 26.0))
     names = {side: [joint.name for joint in mechanism.joints if joint.name[0] == side] for side in "ABC"}
     up = np.array([0.0, 0.0, 1.0])
     mechanism = mechanism.with_limits({name: pf.Cone(up, half, "base") for name in names["A"]})
-    mechanism = mechanism.with_limits({name: pf.Cone(-up, half, "platform") for name in names["C"]})
+    mechanism = mechanism.with_limits({name: pf.Cone(-up, wide, "platform") for name in names["C"]})
     base, ends = (np.array([mechanism.joint(name).at for name in names[side]]) for side in "AC")
     lo, hi = np.array([mechanism.joint(name).range for name in names["B"]]).T
     home = mechanism.home_pose[:3, 3]
@@ -217,10 +217,10 @@ def test_a_pass_of_the_paper_is_its_formulas_on_a_strut_between_two_cones() -> N
         goals = ends - home + target
         inward, outward = goals.copy(), goals.copy()
         for i, (foot, goal) in enumerate(zip(base, goals, strict=True)):
-            back = turned_into(-up, half, foot - goal)
+            back = turned_into(-up, wide, foot - goal)
             inward[i] = goal + np.clip(np.linalg.norm(back), lo[i], hi[i]) * back / np.linalg.norm(back)
             out = turned_into(up, half, goal - foot)
-            out = -turned_into(-up, half, -out)
+            out = -turned_into(-up, wide, -out)
             outward[i] = foot + np.clip(np.linalg.norm(out), lo[i], hi[i]) * out / np.linalg.norm(out)
         stages = {
             kind: [stage for stage in trace if stage.kind == kind and not stage.round] for kind in ("inward", "outward")
