@@ -37,7 +37,7 @@ FARTHER = 1e-2
 """How much farther than the nearest pose that the optimiser finds an exact projection may be, relatively."""
 
 ASSEMBLES = 0.99
-"""Share of values at which forward kinematics by passes ends, in an assembly within limits; near singular ones stall."""
+"""Share of values at which forward kinematics by passes ends, within limits; passes stall near singular poses."""
 
 BEGIN, END = "<!-- reproduce: begin -->", "<!-- reproduce: end -->"
 
