@@ -30,7 +30,7 @@ class JointPoint:
 
 
 class Lock(NamedTuple):
-    """Where the coordinate q of an actuator stands in the arrays: as sign * (q - origin)."""
+    """Place of an actuator's coordinate q in the arrays, where its value is sign * (q - origin)."""
 
     what: Literal["stroke", "hinge", "rail", "end", "trunk"]  # as of `JointMeasure`, or a joint of a trunk
     place: int  # of the node, the branch of the rail, or the trunk joint
@@ -101,7 +101,7 @@ def _compiled(mechanism: Mechanism, chains: Sequence[tuple[Sequence[Step], Seque
 def _locks(
     mechanism: Mechanism, trunks: Sequence[Step], forms: Sequence[BranchForm], branches: Records
 ) -> Iterator[Lock]:
-    """Where the coordinates of the actuators stand; each is in a trunk or a branch."""
+    """Locks of the actuators, in their order; each is in a trunk or a branch."""
     locks = {}
     for b, (form, branch) in enumerate(zip(forms, branches, strict=True)):
         for measure in form.measures:

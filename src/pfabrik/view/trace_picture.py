@@ -125,7 +125,7 @@ def _together(plan: Plan, before: Stage, stages: list[Stage]) -> Stage:
 
 
 class _Picture:
-    """What all pictures of a trace share: the eye, the ground, and what they frame."""
+    """Eye, colours and frame that all pictures of a trace share."""
 
     def __init__(self, trace: PassTrace, view: View | None) -> None:
         self.trace, self.plan, self.look = trace, compile_plan(trace.mechanism).plan, look_of("light")
