@@ -8,11 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .answers.margins import margins
+from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .answers.words import bound_notes
 from .common.arrays import Floats, Ints, shaped
 from .common.executors import Workers, slices
 from .common.printed import ResultTable, plain
+from .engines.engine import engine_of, legs_decide
 from .engines.joints.configurations import Configurations
 from .engines.joints.link_distances import least_distances, pair_names
 from .engines.joints.parasitic import has_parasitic_motion
@@ -23,9 +26,11 @@ from .engines.pose.table import table_handle
 from .engines.pose.tip_engine import measured, start_at_tip
 from .engines.targets import Target, as_targets
 from .errors import UnsupportedMechanism, counted
+from .kernels.rows import REACHED
 from .kernels.threads import in_blocks
 from .machine.description.mechanism import Mechanism, checked_mechanism
 from .machine.model import Model, model_of
+from .options import Options
 from .tolerances import TOLERANCES
 
 ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
@@ -85,10 +90,13 @@ class Feasibility(NamedTuple):
 def feasibility(
     mechanism: Mechanism, targets: Target, *, start: Start | None = None, executor: Executor | None = None
 ) -> Feasibility:
-    """Margins of targets in one working mode, by the legs' closed forms; nothing is projected or searched for.
+    """Margins of targets in one working mode, by the legs' closed forms.
 
     A target whose margin is positive is reached by `solve_ik`; one whose margin is negative may still be, in another
-    working mode.
+    working mode. Where a target does not decide all that legs need, as with a slide under a delta, arms that turn on
+    implicit joints, or a task that leaves a freedom open, what these miss from the start is asked of `solve_ik` with
+    ``working_mode="keep"``: where that reaches the target, the margin is that of its answer. Such targets take as long
+    as it does.
 
     Parameters
     ----------
@@ -120,14 +128,27 @@ def feasibility(
         blocks = [(poses[block], configuration) for block in slices(len(poses))]
         with closing(Workers(executor, mechanism).results(_best_of_modes, blocks)) as results:
             margin, binding = (np.concatenate(parts) for parts in zip(*results, strict=True))
-    limits = model.legs.measured_limits
+    return Feasibility(shaped(margin, shape), shaped(binding, shape), limits_of(mechanism))
+
+
+def limits_of(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
+    """The limits that `feasibility` measures, in its order."""
+    limits = measured(model_of(mechanism)).legs.measured_limits
     if mechanism.clearance is not None:
         limits += tuple((name, "clearance") for name in pair_names(mechanism))
-    return Feasibility(shaped(margin, shape), shaped(binding, shape), limits)
+    return limits
 
 
 def _best_of_modes(mechanism: Mechanism, poses: Floats, configuration: Configurations | None) -> tuple[Floats, Ints]:
-    """Margins (n,) of poses (n, 4, 4), and the indices of their limits; a start on a fold is of both its modes."""
+    """Margins (n,) of poses (n, 4, 4), and the indices of their limits."""
+    margin, binding = margins_of_legs(mechanism, poses, configuration)
+    if not legs_decide(mechanism):
+        _raise_to_kept(mechanism, poses, configuration, margin, binding)
+    return margin, binding
+
+
+def margins_of_legs(mechanism: Mechanism, poses: Floats, configuration: Configurations | None) -> tuple[Floats, Ints]:
+    """Margins (n,) by closed forms alone, and the indices of their limits; a start on a fold is of both its modes."""
     model = model_of(mechanism)
     if measured(model) is not model:
         model, configuration = measured(model), start_at_tip(configuration)
@@ -137,6 +158,23 @@ def _best_of_modes(mechanism: Mechanism, poses: Floats, configuration: Configura
         better = other_margin > margin
         margin[better], binding[better] = other_margin[better], other_binding[better]
     return margin, binding
+
+
+def _raise_to_kept(
+    mechanism: Mechanism, poses: Floats, start: Configurations | None, margin: Floats, binding: Ints
+) -> None:
+    """Write margins (n,) of poses with negative ones that the engine reaches in the mode of a start: its answers'."""
+    missed = np.flatnonzero(margin < 0.0)
+    if not len(missed):
+        return
+    answers = engine_of(mechanism).answer(poses[missed], start, Options(), keep_mode=True)
+    reached = np.flatnonzero(answers.rows.status == REACHED)
+    rows, places = missed[reached], {limit: place for place, limit in reversed([*enumerate(limits_of(mechanism))])}
+    margin[rows], binding[rows] = np.inf, -1
+    for limit, own in margins(Solution(mechanism, answers.at(reached), (len(reached),))).items():
+        least = np.maximum(own, 0.0)  # exceeded by rounding alone
+        lower = least < margin[rows]
+        margin[rows[lower]], binding[rows[lower]] = least[lower], places[limit]
 
 
 def _of_mode(model: Model, poses: Floats, start: Configurations | None) -> tuple[Floats, Ints]:

@@ -6,7 +6,7 @@ contracts in `pyproject.toml` name the few that search or prove by the engines' 
 it is defined.
 
 Machine       model_of, Model; task_of, Task
-Engine        engine_of, kind_of_engine, Engine, Starts, Configurations, why_not_measured
+Engine        engine_of, kind_of_engine, Grower, Starts, Configurations, legs_decide, why_not_measured
 Targets       Target, as_targets, carrying_joint; POSITION_ERROR
 Shown as      readouts, readout, Readout; plane_of
 Graph         tree_of, column_joints, columns; passive_series; links_of
@@ -18,7 +18,7 @@ First order   around_home, generic_of, internal_rates, require_determined; Joint
 Varied        varied, VariedMachine, MachineAt; VariedGeometry; leg_slopes, LegSlopes
 """
 
-from .engines.engine import POSITION_ERROR, Engine, Starts, engine_of, kind_of_engine, why_not_measured
+from .engines.engine import POSITION_ERROR, Grower, Starts, engine_of, kind_of_engine, legs_decide, why_not_measured
 from .engines.joints.configurations import Configurations
 from .engines.joints.first_order import JointRates
 from .engines.targets import Target, as_targets, carrying_joint
@@ -53,7 +53,7 @@ __all__ = [
     "POSITION_ERROR",
     "BodyInertia",
     "Configurations",
-    "Engine",
+    "Grower",
     "JointPath",
     "JointRates",
     "LegSlopes",
@@ -85,6 +85,7 @@ __all__ = [
     "joint_path",
     "kind_of_engine",
     "leg_slopes",
+    "legs_decide",
     "links_of",
     "model_of",
     "parallel_signs",

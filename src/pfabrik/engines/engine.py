@@ -14,6 +14,8 @@ from .chains.serial_chain import is_chain
 from .joints.closure_engine import ClosureEngine
 from .joints.configurations import Configurations as Configurations
 from .joints.engine_contract import Engine as Engine
+from .joints.engine_contract import Grower as Grower
+from .pose.branch import poses_decide
 from .pose.legs_engine import LegsApartByJoints, LegsEngine
 from .pose.links_of_legs import keeps_links
 from .pose.seeds import seeds_of_other_assemblies
@@ -37,6 +39,12 @@ def kind_of_engine(mechanism: Mechanism) -> Literal["legs", "chains", "closure"]
 def why_not_measured(mechanism: Mechanism) -> str:
     """The reason why no closed forms give the margins of poses; empty if they do."""
     return measured(model_of(mechanism)).why_poses_do_not_suffice
+
+
+def legs_decide(mechanism: Mechanism) -> bool:
+    """True if closed forms alone tell whether a target is reached in a working mode; else what they miss is asked."""
+    model = measured(model_of(mechanism))
+    return not model.why_poses_do_not_suffice and poses_decide(model)
 
 
 def knows_all_modes(mechanism: Mechanism) -> bool:

@@ -113,6 +113,7 @@ def narrow(measure: Measure, lines: Lines, neighbours: Ints, close: float) -> In
         on = changed if question.is_quick_anew else changed[:0]
         while len(on):
             on = _went_on(measure, lines, on, question.first_start, close, anew=True)
+            on = on[lines.near[on] < 1.0]  # else the end itself is within, which a search from elsewhere had missed
         is_changed = np.zeros(len(lines.near), bool)
         is_changed[changed] = True
         tried = pairs[is_changed[pairs[:, 0]]]

@@ -18,9 +18,18 @@ from ...common.arrays import Floats, Ints, Mask
 from ...common.batch import put, take_each
 from ...common.rotations import from_rotvec
 from ...configuration import configuration
-from ...feasibility import feasibility
+from ...feasibility import feasibility, limits_of, margins_of_legs
 from ...ik import solve_ik
-from ...kinematics import POSITION_ERROR, Configurations, Engine, Starts, engine_of, home_coordinates, why_not_measured
+from ...kinematics import (
+    POSITION_ERROR,
+    Configurations,
+    Grower,
+    Starts,
+    engine_of,
+    home_coordinates,
+    legs_decide,
+    why_not_measured,
+)
 from ...machine.description.mechanism import Mechanism
 from ...options import Options
 from ...tolerances import TOLERANCES
@@ -35,6 +44,9 @@ INSIDE, OUTSIDE = 1.0, -1.0
 GEOMETRY = ("", "reach")
 """The limit of a border that no limit of a joint forms, where no closed form gives the leg."""
 
+
+HARDLY = 0.05
+"""By how much a limit is exceeded at most just beyond the border that it forms, as a share of its range."""
 
 AZIMUTHS, RING = 24, math.radians(6.0)
 """Number of directions of tilts to every side, and the largest step between tilts [rad]."""
@@ -69,7 +81,7 @@ class MapQuestion:
     @property
     def has_margins(self) -> bool:
         """True if closed forms give margins; else points are solved one by one, and only known as reached or not."""
-        return self.hold == "orientation" and not why_not_measured(self.mechanism)
+        return self.hold == "orientation" and legs_decide(self.mechanism)
 
     @property
     def limits(self) -> Limits:
@@ -79,12 +91,12 @@ class MapQuestion:
     @cached_property
     def _known_limits(self) -> Limits:
         if self.has_margins:
-            return feasibility(self.mechanism, self.mechanism.home_pose).limits
+            return limits_of(self.mechanism)
         home = configuration(self.mechanism, home_coordinates(self.mechanism))
         return (*margins(home), GEOMETRY)
 
     @property
-    def _grower(self) -> Engine:
+    def _grower(self) -> Grower:
         grower = engine_of(self.mechanism).grower(self.hold)
         assert grower is not None
         return grower
@@ -114,7 +126,7 @@ class MapQuestion:
 
         Parameters
         ----------
-        known, anew : as of `Engine.grow`.
+        known, anew : as of `Grower.grow`.
         """
         if not self.is_grown:
             return *self.measure(points), known
@@ -163,6 +175,9 @@ class MapQuestion:
             return np.nan_to_num(
                 feasible.margin, copy=False, nan=-np.inf, posinf=np.inf, neginf=-np.inf
             ), feasible.binding
+        if self.hold == "orientation" and not why_not_measured(self.mechanism):
+            reached = feasibility(self.mechanism, poses, start=self.start).margin >= 0.0
+            return np.where(reached, INSIDE, OUTSIDE), np.full(len(poses), self._unknown)
         return np.where(self._answers(poses)[1], INSIDE, OUTSIDE), np.full(len(poses), self._unknown)
 
     def _answers(self, poses: Floats) -> tuple[Solution, Mask]:
@@ -216,10 +231,24 @@ class MapQuestion:
             bindings = self.measure(points)[1]
         if self.has_margins or len(self.turns) > 1:
             return bindings
+        bindings = self._named_by_legs(points, bindings)
         rows = np.flatnonzero(bindings == self._unknown)
+        if not len(rows):
+            return bindings
         ended = found.at(rows) if self.is_grown else self._answers(self.space.poses(points[rows]))[0]._configurations
         bindings[rows] = self._active(ended.coordinates)
         return bindings
+
+    def _named_by_legs(self, points: Floats, bindings: Ints) -> Ints:
+        """Bindings with those named that closed forms from the start tell: where they are hardly beyond a limit."""
+        if self.hold == "position" or why_not_measured(self.mechanism):
+            return bindings
+        start = None if self.start is None else self.start._configurations
+        margin, binding = margins_of_legs(self.mechanism, self.space.poses(points), start)
+        place = {limit: index for index, limit in enumerate(self._known_limits)}
+        own = np.array([place.get(limit, self._unknown) for limit in limits_of(self.mechanism)])
+        is_told = (bindings == self._unknown) & (margin > -HARDLY) & (margin < 0.0)
+        return np.where(is_told, own[binding], bindings)
 
     def _active(self, coordinates: Floats) -> Ints:
         """The first limit that each row of joint coordinates is on, by its place in `limits`; that of reach if none."""

@@ -25,7 +25,7 @@ from ..joints.attempts import Attempt, held_words, with_verdicts
 from ..joints.close import Closing, measure_configurations
 from ..joints.closure_engine import ClosureEngine
 from ..joints.configurations import Configurations, coordinates_for, joint_coordinates, new_rows, steps_of
-from ..joints.engine_contract import Counted, Engine, Prepared
+from ..joints.engine_contract import Counted, Engine, Grower, Prepared
 from ..joints.projection import ProjectionMode
 from ..joints.stretched import BentConfiguration
 from .chain_tables import ROWS_A_BLOCK, new_scratch, question_of, scratch_of_chain, tables_of, walk
@@ -200,7 +200,7 @@ class ChainEngine(Engine):
         """Move as many configurations to targets (n, 4, 4) in their working modes; FAILED where not reached."""
         return self._joint_space.advance(targets, start)
 
-    def grower(self, counted: Counted) -> Engine | None:
+    def grower(self, counted: Counted) -> Grower | None:
         """As `ClosureEngine.grower`."""
         return self._joint_space.grower(counted)
 

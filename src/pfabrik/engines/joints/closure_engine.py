@@ -41,7 +41,7 @@ from .configurations import (
     steps_of,
     write_closing,
 )
-from .engine_contract import Counted, Engine
+from .engine_contract import Counted, Engine, Grower
 from .joint_answers import answer_rows, logged, near_rows, question_of
 from .link_distances import clearance_excess
 from .placed_links import placed_at
@@ -137,18 +137,18 @@ class ClosureEngine(Engine):
         """Move as many configurations to targets (n, 4, 4) in their working modes; FAILED where not reached."""
         return self._answer(targets, start.coordinates, USUAL, question_of(REACH, True, True))
 
-    def grower(self, counted: Counted) -> Engine | None:
+    def grower(self, counted: Counted) -> Grower | None:
         """Itself where whole poses count: a target out of reach costs a hundred times as much as one within."""
         return self if counted == "orientation" else None
 
     def known(self, start: Configurations | None) -> Starts:
-        """As `Engine.known`: by joint coordinates."""
+        """As `Grower.known`: by joint coordinates."""
         poses = self.model.mechanism.home_pose[None] if start is None else start.rows.poses
         coordinates = start_coordinates(self.model, None) if start is None else start.coordinates
         return Starts(in_lengths(poses, 1.0 / self.model.length), coordinates, np.zeros((0, 0)))
 
     def grow(self, known: Starts, targets: Floats, *, anew: bool, keep_mode: bool) -> Configurations:
-        """As `Engine.grow`: in one step, `anew` by continuation; FAILED where not reached."""
+        """As `Grower.grow`: in one step, `anew` by continuation; FAILED where not reached."""
         begin = np.repeat(known.q, len(targets), axis=0) if len(known.q) == 1 else known.q
         return self._answer(targets, begin, USUAL, question_of(REACH if anew else STEP, True, True))
 

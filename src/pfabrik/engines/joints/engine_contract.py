@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from typing import Literal
+from typing import Literal, Protocol
 
 from ...common.arrays import Floats
 from ...kernels.pose.search_records import Starts
@@ -70,20 +70,11 @@ class InverseEngine(ABC):
         return None
 
 
-class Engine(InverseEngine):
-    """Solves a mechanism: inverse and forward kinematics, and what results say about configurations."""
-
-    @abstractmethod
-    def advance(self, targets: Floats, start: Configurations) -> Configurations:
-        """Move as many configurations to targets (n, 4, 4) in their working modes; not REACHED where that fails."""
-
-    def grower(self, counted: Counted) -> Engine | None:
-        """The engine that grows known configurations, where this takes far less time than to answer targets anew."""
-        return None
+class Grower(Protocol):
+    """Grows known configurations from one target to the next."""
 
     def known(self, start: Configurations | None) -> Starts:
         """Configurations as what others grow from; None for home."""
-        raise NotImplementedError
 
     def grow(self, known: Starts, targets: Floats, *, anew: bool, keep_mode: bool) -> Configurations:
         """Move known configurations, one or as many, to nearby targets (n, 4, 4); PROJECTED where the nearest is found.
@@ -93,7 +84,18 @@ class Engine(InverseEngine):
         anew : targets may be far, and are searched for from the machine's seeds too, where it has any.
         keep_mode : stay in the working modes of the known configurations.
         """
-        raise NotImplementedError
+
+
+class Engine(InverseEngine):
+    """Solves a mechanism: inverse and forward kinematics, and what results say about configurations."""
+
+    @abstractmethod
+    def advance(self, targets: Floats, start: Configurations) -> Configurations:
+        """Move as many configurations to targets (n, 4, 4) in their working modes; not REACHED where that fails."""
+
+    def grower(self, counted: Counted) -> Grower | None:
+        """What grows known configurations, where this takes far less time than to answer targets anew."""
+        return None
 
     def rested(self, answers: Configurations, start: Configurations | None) -> Configurations:
         """Answers whose projections have their redundant joints as near to those of the start as their poses let them.

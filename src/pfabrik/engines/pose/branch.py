@@ -128,6 +128,15 @@ def _independent_rows(model: Model) -> list[int]:
     return []
 
 
+def poses_decide(model: Model) -> bool:
+    """True if what the task leaves open of a pose follows from the legs, which have no implicit joints besides.
+
+    Then a target and the sides of the legs are one configuration: there is nothing to search for.
+    """
+    table = model.legs
+    return not table.has_implicit_joints and (not table.is_partial or len(_independent_rows(model)) > 0)
+
+
 def _slopes_of_open(model: Model, poses: Floats, sides: Floats) -> Floats:
     """Derivatives C of all constraints by the open unknowns, (n, rows, k) [L, rad]; NaN at dead points."""
     from ...kernels.pose.evaluate import evaluate_poses
@@ -166,7 +175,7 @@ def kept(
 ) -> Configurations:
     """Replace answers in another working mode than their start by the result of continuation from the start."""
     branch = sides_at(model, start)
-    has_left = (answers.rows.status <= PROJECTED) & ~_is_in_mode(model, answers, branch)
+    has_left = (answers.rows.status <= PROJECTED) & ~in_branch(model, answers, branch)
     for row in np.flatnonzero(has_left):
         place = np.array([row])
         row_start, row_branch = (start, branch) if len(start) == 1 else (start.at(place), branch[place])
@@ -174,7 +183,7 @@ def kept(
     return answers
 
 
-def _is_in_mode(model: Model, answers: Configurations, branch: Floats) -> Mask:
+def in_branch(model: Model, answers: Configurations, branch: Floats) -> Mask:
     """True where no leg with two solutions is on another branch than in `branch`, (n,)."""
     return same_branch(sides_at(model, answers), branch * (model.legs.home_sides != 0.0))
 
@@ -186,7 +195,7 @@ def _continue_to(model: Model, target: Floats, start: Configurations, branch: Fl
     def advance(_rows: NDArray[np.intp], shares: Floats) -> Mask:
         nonlocal last
         trial = answer(between(start_pose, target, shares), last)
-        is_kept = (trial.rows.status == REACHED) & _is_in_mode(model, trial, branch)
+        is_kept = (trial.rows.status == REACHED) & in_branch(model, trial, branch)
         last = trial if is_kept[0] else last
         return np.asarray(is_kept)
 

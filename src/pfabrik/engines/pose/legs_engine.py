@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,12 +34,12 @@ from ..joints.attempts import Attempt
 from ..joints.close import Closing, in_lengths
 from ..joints.closure_engine import ClosureEngine
 from ..joints.configurations import Configurations, new_rows, steps_of
-from ..joints.engine_contract import Counted, Engine, Prepared
+from ..joints.engine_contract import Counted, Engine, Grower, Prepared
 from ..joints.link_distances import too_near
 from ..joints.parasitic import has_other_assemblies
 from ..joints.projection import ProjectionMode, modes_of
 from .answers import LegAnswers, leg_answers, sides_at
-from .branch import answer_unreached, home_answer, kept, starts_beside
+from .branch import answer_unreached, home_answer, in_branch, kept, poses_decide, starts_beside
 from .coordinates import joint_coordinates
 from .forward import forward_kinematics
 from .leg_attempts import attempts
@@ -47,6 +48,16 @@ from .nearest import limit_multipliers, nearest_positions
 from .nearest_pose import starts_at
 from .reach import count_turns, reach, rest_redundant, turns_repeatedly
 from .single import Answers, LegsAssembly, SingleTarget, assembly_of, mark_near, new_scratch, request_from
+
+STEPS_FROM_NEAR = 60
+"""Steps of a search from a configuration next to a target, which is reached in a few or not at all."""
+
+
+def distances_of(model: Model, rows: Rows, options: Options) -> Floats:
+    """Distances of projections from their targets, priced as options say, (n,) [L]."""
+    closure = model.path_closure
+    errors = rows.measures[:, POSITION_ERROR], rows.measures[:, ROTATION_ERROR]
+    return modes_of(closure, options)[-1].distances(closure, *errors)
 
 
 class LegsEngine(Engine):
@@ -59,18 +70,18 @@ class LegsEngine(Engine):
     """
 
     def __init__(self, model: Model) -> None:
-        self._model, self._table = model, model.legs
+        self.model, self._table = model, model.legs
         self._joint_space, self._single = ClosureEngine(model), SingleTarget(model)
         self.bounds_steps, self._keeps_apart = self._searches, len(links_of_legs(model).pairs) > 0
 
     @cached_property
     def _assembly(self) -> LegsAssembly:
-        return assembly_of(self._model)
+        return assembly_of(self.model)
 
     @cached_property
     def _searches(self) -> bool:
         """True if unreached targets are searched for in the platform's pose, before joint coordinates."""
-        return not has_other_assemblies(self._model.path_closure)
+        return not has_other_assemblies(self.model.path_closure)
 
     def answer(
         self,
@@ -94,7 +105,7 @@ class LegsEngine(Engine):
         if isinstance(answers, LegAnswers) and answers.q_proximal is None and not is_missed:
             return answers
         answers = self._in_mode(answers, targets, start, options)
-        for is_folded, begin in starts_beside(self._model, start):
+        for is_folded, begin in starts_beside(self.model, start):
             others = self._by_stages(targets, begin, options, keep_mode, nearby)
             others = self._in_mode(others, targets, begin, options)
             better = np.flatnonzero(is_folded & self._is_nearer(others.rows, answers.rows, options))
@@ -112,7 +123,7 @@ class LegsEngine(Engine):
         def answer(target: Floats, begin: Configurations) -> Configurations:
             return self._by_stages(target, begin, options, True, True)
 
-        return kept(self._model, answers, targets, home_answer(self._model) if start is None else start, answer)
+        return kept(self.model, answers, targets, home_answer(self.model) if start is None else start, answer)
 
     def _by_stages(
         self, targets: Floats, start: Configurations | None, options: Options, keep_mode: bool, nearby: bool
@@ -121,7 +132,7 @@ class LegsEngine(Engine):
 
         As `answer`, from a start on a fold in one of the modes that meet there.
         """
-        model, start_sides = self._model, self._sides_of(start)
+        model, start_sides = self.model, self._sides_of(start)
         is_one = len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1))
         rows, sides = self._single.new_rows() if is_one else new_rows(model, len(targets)), start_sides
         if is_one:
@@ -162,19 +173,19 @@ class LegsEngine(Engine):
         """
         unsolved, start_sides = np.flatnonzero(rows.status > PROJECTED), self._sides_of(start)
         if not len(unsolved):
-            return leg_answers(self._model, rows, sides, q, start, start_sides)
+            return leg_answers(self.model, rows, sides, q, start, start_sides)
         begin = start if start is None or len(start) in (1, len(unsolved)) else start.at(unsolved)
         fallback = by_joints(unsolved, begin)
         left = take(rows, unsolved)
         is_kept = (left.status == UNSURE) & ~self._is_nearer(fallback.rows, left, options)
         rows.status[unsolved[is_kept]] = PROJECTED
-        by_legs = leg_answers(self._model, rows, sides, q, start, start_sides)
+        by_legs = leg_answers(self.model, rows, sides, q, start, start_sides)
         if is_kept.any():
             unsolved, fallback = unsolved[~is_kept], fallback.at(np.flatnonzero(~is_kept))
         if not len(unsolved) or len(unsolved) == len(rows.status):
             return fallback if len(unsolved) else by_legs
         put(rows, unsolved, fallback.rows)  # no pose is left unset, for coordinates that are computed for all rows
-        sides = sides_at(self._model, fallback)
+        sides = sides_at(self.model, fallback)
         return by_legs.with_rows(unsolved, LegAnswers(fallback.rows, fallback.coordinates, sides))
 
     def rested(self, answers: Configurations, start: Configurations | None) -> Configurations:
@@ -186,8 +197,8 @@ class LegsEngine(Engine):
         rows, old = take(answers.rows, projected), answers.at(projected)
         old_sides = self._sides_of(old)
         sides = old_sides.copy()
-        nearer = rest_redundant(self._model, start, self._sides_of(start), sides, rows).nonzero()[0]
-        others = leg_answers(self._model, rows, sides, None, old, old_sides)
+        nearer = rest_redundant(self.model, start, self._sides_of(start), sides, rows).nonzero()[0]
+        others = leg_answers(self.model, rows, sides, None, old, old_sides)
         return answers.with_rows(projected[nearer], others.at(nearer)) if len(nearer) else answers
 
     def attempts(
@@ -196,19 +207,14 @@ class LegsEngine(Engine):
         """As `InverseEngine.attempts`: of the legs, then of the joint coordinates, which answer what legs leave."""
         last = None
         if self._searches:
-            for last in attempts(self._model, target, start, self._sides_of(start), options, keep_mode=keep_mode):
+            for last in attempts(self.model, target, start, self._sides_of(start), options, keep_mode=keep_mode):
                 yield last
         if last is None or last.ending != "reached":
             yield from self._joint_space.attempts(target, start, options, keep_mode=keep_mode)
 
     def _is_nearer(self, others: Rows, rows: Rows, options: Options) -> Mask:
         """True where others reach targets that rows do not, or come nearer, (n,)."""
-        closure = self._model.path_closure
-        projection = modes_of(closure, options)[-1]
-        distances, other_distances = (
-            projection.distances(closure, batch.measures[:, POSITION_ERROR], batch.measures[:, ROTATION_ERROR])
-            for batch in (rows, others)
-        )
+        distances, other_distances = (distances_of(self.model, batch, options) for batch in (rows, others))
         is_nearer = (others.status == PROJECTED) & (other_distances < distances - TOLERANCES.position)
         return np.asarray((rows.status != REACHED) & ((others.status == REACHED) | is_nearer))
 
@@ -217,11 +223,11 @@ class LegsEngine(Engine):
         if start is not None and turns_repeatedly(self._table):
             return None
         single, start_pose = self._single, self._single.home if start is None else start.rows.poses
-        sides = single.home_sides if start is None else sides_at(self._model, start)
+        sides = single.home_sides if start is None else sides_at(self.model, start)
         call = single.prepared(target, start_pose, sides, rows, nearby=keep_mode)
         if not self._keeps_apart:
             return call, single
-        return lambda: call() or mark_near(self._model, rows, sides), single
+        return lambda: call() or mark_near(self.model, rows, sides), single
 
     def follow(
         self,
@@ -242,7 +248,7 @@ class LegsEngine(Engine):
 
     def _joined(self, answers: Sequence[Configurations], start: Configurations | None) -> Configurations:
         """Single answers as one batch; the first of them began at `start`."""
-        rows, n_legs = new_rows(self._model, len(answers)), len(self._table.legs)
+        rows, n_legs = new_rows(self.model, len(answers)), len(self._table.legs)
         sides, q_proximal = (
             np.repeat(self._table.home_sides, len(answers), axis=0),
             np.full((len(answers), n_legs), np.nan),
@@ -253,7 +259,7 @@ class LegsEngine(Engine):
                 sides[i] = answer.sides
                 if answer.q_proximal is not None:
                     q_proximal[i] = answer.q_proximal
-        joined = leg_answers(self._model, rows, sides, q_proximal, start, self._sides_of(start))
+        joined = leg_answers(self.model, rows, sides, q_proximal, start, self._sides_of(start))
         by_joints = np.array([i for i, answer in enumerate(answers) if not isinstance(answer, LegAnswers)], np.intp)
         if not len(by_joints):
             return joined
@@ -266,10 +272,10 @@ class LegsEngine(Engine):
         Use the legs' closed forms where the start is non-singular and the pose fixes every coordinate; otherwise solve
         in joint space.
         """
-        model, table, start_sides = self._model, self._table, sides_at(self._model, start)
+        model, table, start_sides = self.model, self._table, sides_at(self.model, start)
         rows, at_start = (new_rows(model, len(targets)) for _ in range(2))
         coordinates = start.coordinates.copy()
-        _, sides = reach(self._model, targets, start, start_sides, True, rows)
+        _, sides = reach(self.model, targets, start, start_sides, True, rows)
         reached = np.flatnonzero(rows.status == REACHED)
         coordinates_reached = joint_coordinates(
             model, rows.poses[reached], rows.actuators[reached], sides[reached], coordinates[reached]
@@ -280,7 +286,7 @@ class LegsEngine(Engine):
         reached, coordinates_reached = reached[~is_turned], coordinates_reached[~is_turned]
         coordinates[reached] = coordinates_reached
         if len(reached) < len(targets):
-            reach(self._model, start.rows.poses, start, start_sides, True, at_start)
+            reach(self.model, start.rows.poses, start, start_sides, True, at_start)
             is_decided = (at_start.status == REACHED) & ~np.bool_(table.leaves_open)
             unsolved = np.flatnonzero((rows.status != REACHED) & ~is_decided)
             fallback = self._joint_space.advance(targets[unsolved], start.at(unsolved))
@@ -290,18 +296,23 @@ class LegsEngine(Engine):
         rows.status[too_near(self, model.mechanism, answers)] = FAILED
         return answers
 
-    def grower(self, counted: Counted) -> Engine | None:
-        """Itself where positions alone count, if one assembly has all targets and searches keep links apart."""
-        return self if counted == "position" and self._searches and keeps_links(self._model) else None
+    def grower(self, counted: Counted) -> Grower | None:
+        """Itself where positions alone count, if one assembly has all targets and searches keep links apart.
+
+        Where whole poses do, but leave something to search for: by answers from one configuration to the next.
+        """
+        if counted == "orientation":
+            return None if poses_decide(self.model) else GrownAnswers(self)
+        return self if self._searches and keeps_links(self.model) else None
 
     def known(self, start: Configurations | None) -> Starts:
-        """As `Engine.known`: by poses and sides."""
-        poses = self._model.mechanism.home_pose[None] if start is None else start.rows.poses
-        return starts_at(self._model, poses, self._sides_of(start))
+        """As `Grower.known`: by poses and sides."""
+        poses = self.model.mechanism.home_pose[None] if start is None else start.rows.poses
+        return starts_at(self.model, poses, self._sides_of(start))
 
     def grow(self, known: Starts, targets: Floats, *, anew: bool, keep_mode: bool) -> Configurations:
-        """As `Engine.grow`, for the positions of targets: the orientation follows."""
-        model, length = self._model, self._model.length
+        """As `Grower.grow`, for the positions of targets: the orientation follows."""
+        model, length = self.model, self.model.length
         found = nearest_positions(model, targets, known, seeds=anew, keep_mode=keep_mode)
         rows = Rows(found.status, found.counters, found.poses, found.actuators, found.measures)
         is_closed = rows.measures[:, RESIDUAL] <= TOLERANCES.position * length
@@ -320,7 +331,7 @@ class LegsEngine(Engine):
         """Joint name -> position of its centre in the base frame, (n, 3) [length]."""
         if not isinstance(answers, LegAnswers):
             return self._joint_space.points(answers)
-        centres = centres_at(self._model.mechanism, answers.rows.poses, answers.rows.actuators)
+        centres = centres_at(self.model.mechanism, answers.rows.poses, answers.rows.actuators)
         return centres if centres is not None else self._joint_space.points(answers)
 
     def limit_multipliers(self, answers: Configurations, targets: Floats, way: ProjectionMode) -> Floats:
@@ -329,11 +340,11 @@ class LegsEngine(Engine):
             return self._joint_space.limit_multipliers(answers, targets, way)
         has_proximal = np.isfinite(answers.q_proximal).all(axis=1)
         by_legs, by_joints = np.flatnonzero(has_proximal), np.flatnonzero(~has_proximal)
-        scale = 1.0 / self._model.length
+        scale = 1.0 / self.model.length
         solutions = Starts(
             in_lengths(answers.rows.poses[by_legs], scale), answers.q_proximal[by_legs], answers.sides[by_legs]
         )
-        weights = limit_multipliers(self._model, targets[by_legs], solutions, way)
+        weights = limit_multipliers(self.model, targets[by_legs], solutions, way)
         if not len(by_joints):
             return weights
         others = self._joint_space.limit_multipliers(answers.at(by_joints), targets[by_joints], way)
@@ -352,11 +363,11 @@ class LegsEngine(Engine):
             ends = self._assembly.new_ends(rows)
             own = self._forward_start(start, start_sides)
             is_solved = self._assembly.prepared(own, rows, ends, self._assembly.scratch)() == 0
-            if is_solved and not (self._keeps_apart and mark_near(self._model, rows, ends.sides)):
-                return leg_answers(self._model, rows, ends.sides, ends.q, start, start_sides)
+            if is_solved and not (self._keeps_apart and mark_near(self.model, rows, ends.sides)):
+                return leg_answers(self.model, rows, ends.sides, ends.q, start, start_sides)
             given = rows, ends
         nearby = start is not None and keep_mode
-        request = request_from(self._model, Options(), start, start_sides, keep_mode, nearby, tolerance)
+        request = request_from(self.model, Options(), start, start_sides, keep_mode, nearby, tolerance)
         starts = self._forward_start(start, start_sides).record
         rows, q_proximal, sides = forward_kinematics(request, values, starts, given)
         projected = np.flatnonzero(rows.status == PROJECTED)
@@ -372,21 +383,21 @@ class LegsEngine(Engine):
 
     def prepared_forward(self, start: Configurations | None, rows: Rows) -> Prepared | None:
         """As `Engine.prepared_forward`; with the call, its start and its scratch memory; None with a clearance."""
-        if self._model.mechanism.clearance is not None:
+        if self.model.mechanism.clearance is not None:
             return None
         start_handle = self._forward_start(start, self._sides_of(start))
-        scratch = Handle(new_scratch(self._model))
+        scratch = Handle(new_scratch(self.model))
         call = self._assembly.prepared(start_handle, rows, self._assembly.new_ends(rows), scratch)
         return call, (start_handle, scratch)
 
     def _forward_start(self, start: Configurations | None, sides: Floats) -> Handle[Starts]:
         if start is None:
             return self._assembly.home
-        return Handle(starts_at(self._model, start.rows.poses, sides))
+        return Handle(starts_at(self.model, start.rows.poses, sides))
 
     def _sides_of(self, start: Configurations | None) -> Floats:
         """The side of each leg at a start, (n or 1, legs)."""
-        return self._table.home_sides if start is None else sides_at(self._model, start)
+        return self._table.home_sides if start is None else sides_at(self.model, start)
 
     def _reach_one(
         self, target: Floats, start: Configurations | None, sides: Floats, keep_mode: bool, rows: Rows
@@ -396,8 +407,33 @@ class LegsEngine(Engine):
         if self._single.reach(target, start_pose, sides, rows, nearby=keep_mode):
             return False
         if start is not None:
-            count_turns(self._model, start.rows.actuators, rows)
+            count_turns(self.model, start.rows.actuators, rows)
         return True
+
+
+class GrownAnswers(NamedTuple):
+    """Grows answers to whole poses that the legs alone do not decide: from near starts in few steps, anew in full."""
+
+    engine: LegsEngine
+
+    def known(self, start: Configurations | None) -> Starts:
+        """As `Grower.known`."""
+        return self.engine.known(start)
+
+    def grow(self, known: Starts, targets: Floats, *, anew: bool, keep_mode: bool) -> Configurations:
+        """As `Grower.grow`; the distance to a projection is that of its pose, turns included."""
+        model = self.engine.model
+        rows = new_rows(model, len(known.poses))
+        rows.poses[:] = in_lengths(known.poses, model.length)
+        start = leg_answers(model, rows, known.sides, None, None, known.sides)
+        options = Options(hold=None, most_steps=None if anew else STEPS_FROM_NEAR)
+        answers = self.engine.answer(targets, start, options, keep_mode=keep_mode, nearby=not anew)
+        status, measures = answers.rows.status, answers.rows.measures
+        if keep_mode and not anew:
+            status[~in_branch(model, answers, known.sides)] = FAILED
+        missed = status == PROJECTED
+        measures[missed, POSITION_ERROR] = model.length * distances_of(model, answers.rows, options)[missed]
+        return answers
 
 
 class LegsApartByJoints(LegsEngine):
@@ -414,7 +450,7 @@ class LegsApartByJoints(LegsEngine):
     ) -> Configurations:
         """As `LegsEngine.answer`."""
         answers = super().answer(targets, start, options, keep_mode=keep_mode, nearby=nearby)
-        near = too_near(self, self._model.mechanism, answers)
+        near = too_near(self, self.model.mechanism, answers)
         return self._joint_space.apart(near, answers, targets, start, options, keep_mode=keep_mode or nearby)
 
     def forward(
@@ -422,7 +458,7 @@ class LegsApartByJoints(LegsEngine):
     ) -> Configurations:
         """As `Engine.forward`."""
         answers = super().forward(values, start, tolerance, keep_mode=keep_mode)
-        near = too_near(self, self._model.mechanism, answers)
+        near = too_near(self, self.model.mechanism, answers)
         return self._joint_space.forward_apart(near, answers, values, start, tolerance)
 
     def prepared(self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool) -> Prepared | None:

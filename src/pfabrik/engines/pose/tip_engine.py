@@ -18,7 +18,7 @@ from ...options import Options
 from ..joints.attempts import Attempt
 from ..joints.close import Closing, platform_poses
 from ..joints.configurations import Configurations
-from ..joints.engine_contract import Counted, Engine
+from ..joints.engine_contract import Counted, Engine, Grower
 from ..joints.link_distances import too_near
 from ..joints.projection import ProjectionMode
 from .legs_engine import LegsEngine
@@ -113,7 +113,7 @@ class TipEngine(Engine):
         answers.rows.status[too_near(self, self.model.mechanism, answers)] = FAILED
         return answers
 
-    def grower(self, counted: Counted) -> Engine | None:
+    def grower(self, counted: Counted) -> Grower | None:
         """As `Engine.grower`: by the usual engine, where positions alone count."""
         return self.usual.grower(counted) if counted == "position" else None
 

@@ -142,19 +142,40 @@ def _unit(vectors: Floats) -> Floats:
 
 
 def assembly_signs(mechanism: Mechanism, q: Floats) -> Floats:
-    """Signs of det C_b of a linkage with one freedom at coordinates q (n, c), (n, blocks); 0 at dead points.
+    """Signs of the blocks of a linkage with one freedom at coordinates q (n, c), (n, blocks); 0 at dead points.
 
-    C_b are the loop conditions of a block in the joints that follow from these loops, as joints of earlier blocks are
-    where they are: where it is singular, at dead points and change points, these may go on in either of two modes. Each
-    block has a sign of its own, for that of a product stays where two change at once. No blocks where none is known.
+    At dead points and change points of a block the joints that follow from its loops may go on in either of two modes.
+    Each block has a sign of its own, for that of a product stays where two change at once: that of det [C N; Z' 0],
+    with C its conditions in these joints, N the conditions that no joint breaks, as in a plane, and Z the turns of rods
+    about themselves. N and Z are signed as at home; the sign is 0 too where they have turned away too far for that.
+    No blocks where none is known.
     """
     blocks = loop_blocks(mechanism)
     if not len(blocks) or not len(q):
         return np.zeros((len(q), len(blocks)))
     invalid = np.asarray(np.isnan(q).any(axis=1))
     conditions = loop_slopes(mechanism, np.where(invalid[:, None], 0.0, q))
-    signs = [np.sign(np.linalg.det(block.basis @ conditions[:, block.rows][:, :, block.columns])) for block in blocks]
+    signs = [_sign_of(block, conditions) for block in blocks]
     return np.asarray(np.where(invalid[:, None], 0.0, np.stack(signs, axis=1)))
+
+
+def _sign_of(block: LoopBlock, conditions: Floats) -> Floats:
+    """The sign of one block at loop conditions (n, 6 loops, c), (n,)."""
+    C, N, Z = _parts(conditions, block.rows, block.columns, block.kept.shape[1], block.idle.shape[1])
+    bordered = np.zeros((len(C), C.shape[1] + Z.shape[2], C.shape[2] + N.shape[2]))
+    bordered[:, : C.shape[1], : C.shape[2]], bordered[:, : C.shape[1], C.shape[2] :] = C, N
+    bordered[:, C.shape[1] :, : C.shape[2]] = np.swapaxes(Z, 1, 2)
+    alike = np.linalg.det(block.kept.T @ N), np.linalg.det(block.idle.T @ Z)
+    is_known = np.minimum(*np.abs(alike)) > TURNED_AWAY
+    return np.asarray(np.where(is_known, np.sign(np.linalg.det(bordered) * alike[0] * alike[1]), 0.0))
+
+
+def _parts(conditions: Floats, rows: Ints, columns: Ints, n_kept: int, n_idle: int) -> tuple[Floats, Floats, Floats]:
+    """C, N and Z of a block, of `assembly_signs`, at loop conditions (n, 6 loops, c)."""
+    C = conditions[:, rows][:, :, columns]
+    left, _, right = np.linalg.svd(C)
+    right = np.swapaxes(right, 1, 2)
+    return C, left[:, :, left.shape[2] - n_kept :], right[:, :, right.shape[2] - n_idle :]
 
 
 def are_opposite(signs: Floats, kept: Floats) -> Mask:
@@ -168,24 +189,25 @@ class LoopBlock(NamedTuple):
     Attributes
     ----------
     rows, columns : their conditions, and these joints, as of `loop_slopes`.
-    basis : orthonormal combinations of the conditions that are independent everywhere, as many as joints.
+    kept : N at home, (rows, k): conditions that no joint of these loops breaks.
+    idle : Z at home, (columns, i): motions that move nothing else, as the turn of a rod between two balls.
     """
 
     rows: Ints
     columns: Ints
-    basis: Floats
+    kept: Floats
+    idle: Floats
 
 
 @derived
 def loop_blocks(mechanism: Mechanism) -> tuple[LoopBlock, ...]:
     """The blocks of a linkage whose driven joint is its only freedom, from the drive outward; none of others.
 
-    They are Assur's groups. None either where the independent conditions are not the same everywhere, as they are of
-    loops in a plane.
+    They are Assur's groups.
     """
     generic, actuated = generic_of(mechanism), actuated_columns(mechanism)
     passive = np.setdiff1d(np.flatnonzero(column_moves(mechanism) > 0.0), actuated)
-    if not len(passive) or generic.mobility.platform != 1 or len(actuated) != 1 or len(passive) != generic.rank:
+    if not len(passive) or generic.mobility.platform != 1 or len(actuated) != 1:
         return ()
     conditions = loop_slopes(mechanism, around_home(mechanism))
     joints = conditions.reshape(len(conditions), -1, 6, conditions.shape[2])
@@ -211,16 +233,21 @@ def _next_block(conditions: Floats, is_on: Mask, left: Ints, passive: Ints) -> L
 
 
 def _block(conditions: Floats, is_on: Mask, loops: Ints, passive: Ints) -> LoopBlock | None:
-    """The block of some loops, if they place as many joints as they have independent conditions."""
+    """The block of some loops, if they place all of their joints that are not placed yet, but for idle motions."""
     columns = passive[is_on[loops][:, passive].any(axis=0)]
-    if len(columns) > 6 * len(loops):
-        return None
     rows = (6 * loops[:, None] + np.arange(6)).ravel()
-    together = np.concatenate(list(conditions[:, rows][:, :, columns]), axis=1)
-    directions, sizes, _ = np.linalg.svd(together, full_matrices=False)
-    basis = directions[:, sizes > TOLERANCES.alignment].T
-    return LoopBlock(rows, columns, basis) if len(basis) == len(columns) else None
+    C = conditions[:, rows][:, :, columns]
+    ranks = np.linalg.matrix_rank(C, tol=TOLERANCES.alignment)
+    rank = int(ranks.max(initial=0))
+    _, kept, idle = _parts(conditions, rows, columns, len(rows) - rank, len(columns) - rank)
+    if np.abs(conditions[:, :, columns] @ idle)[ranks == rank].max(initial=0.0) > TOLERANCES.alignment:
+        return None  # other loops hold what these leave free
+    regular = int((ranks == rank).argmax())
+    return LoopBlock(rows, columns, kept[regular], idle[regular])
 
+
+TURNED_AWAY = 0.2
+"""Volume that N, or Z, spans with its directions at home, below which nothing is said of its sign."""
 
 MOST_TOGETHER = 4
 """Most loops that are tried together before all that are left are."""
