@@ -17,9 +17,10 @@ from .engines.engine import engine_of, knows_all_modes
 from .engines.joints.close import measure_configurations
 from .engines.joints.closure_engine import ClosureEngine
 from .engines.joints.configurations import Configurations
-from .engines.joints.engine_contract import InverseEngine
+from .engines.joints.engine_contract import Engine, InverseEngine
 from .engines.joints.parasitic import has_parasitic_motion
 from .engines.joints.projection import modes_of
+from .engines.kept_assembly import within_assembly
 from .engines.targets import Target, as_targets, refuse_invalid
 from .errors import InvalidArgument
 from .kernels.rows import CERTAIN, HOLD, ITERATIONS, PROJECTED, REACHED, RESIDUAL
@@ -137,6 +138,8 @@ def _answers(
             "start", "none that is feasible", "loops closed, limits kept: with most_steps it may answer"
         )
     solutions = engine.answer(targets, begin, options, keep_mode=keep_mode)
+    if keep_mode and not options.most_steps and isinstance(engine, Engine):
+        solutions = within_assembly(engine, mechanism, targets, begin, solutions, options)
     status = solutions.rows.status
     if not (status[0] != REACHED if len(status) == 1 else (status != REACHED).any()):
         return solutions

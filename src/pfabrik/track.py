@@ -5,35 +5,30 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .answers.answer_fields import PoseRequest
 from .answers.pace import pace_of
 from .answers.start_configuration import Start, start_of
 from .answers.status import Status
 from .answers.tracked import Track
-from .common.arrays import Floats, Mask
+from .common.arrays import Floats
 from .common.batch import put
 from .common.rotations import whole_turns
 from .common.telling import telling
 from .engines.engine import engine_of
 from .engines.joints.close import measure_configurations
 from .engines.joints.configurations import Configurations
-from .engines.joints.effort import continued
 from .engines.joints.engine_contract import InverseEngine, OnProgress
+from .engines.kept_assembly import up_to_dead_point
 from .engines.targets import Target, as_targets, refuse_invalid
 from .errors import InvalidArgument, counted
-from .kernels.rows import POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR, Rows
+from .kernels.rows import PROJECTED, REACHED, Rows
 from .machine.description.mechanism import Mechanism
-from .machine.description.task import task_of
 from .machine.model import model_of
 from .machine.motion.singularities import are_opposite, assembly_signs
-from .machine.poses import between
 from .options import Options, checked_options
 from .tolerances import TOLERANCES
-
-LEAST_STEP = 1e-13
-"""Share of a step of a path to which the dead point that it passes is found: rounding is near."""
 
 
 def track(
@@ -145,31 +140,10 @@ def _kept_assembly(
         if answer.rows.status[0] == REACHED and is_kept:
             kept = answer
         elif answer.rows.status[0] <= PROJECTED and not is_kept:
-            answer = _up_to_dead_point(mechanism, target, kept, signs, options)
+            answer = up_to_dead_point(engine, mechanism, target, kept, signs, options)
         put(solutions.rows, [row], answer.rows)
         solutions.coordinates[row] = answer.coordinates[0]
     return solutions
-
-
-def _up_to_dead_point(
-    mechanism: Mechanism, target: Floats, start: Configurations, signs: Floats, options: Options
-) -> Configurations:
-    """The last configuration with the start's signs of assembly on the straight way to a target (1, 4, 4)."""
-    engine, begin, kept = engine_of(mechanism), start.rows.poses.copy(), start.at(np.zeros(1, int))
-
-    def advance(_rows: NDArray[np.intp], shares: Floats) -> Mask:
-        nonlocal kept
-        there = engine.advance(between(begin, target, shares), kept)
-        is_kept = (there.rows.status == REACHED) & ~are_opposite(assembly_signs(mechanism, there.coordinates), signs)
-        kept = there if is_kept[0] else kept
-        return np.asarray(is_kept)
-
-    continued(1, advance, LEAST_STEP)
-    position, rotation = task_of(mechanism).errors(kept.rows.poses, target)
-    kept.rows.measures[:, POSITION_ERROR], kept.rows.measures[:, ROTATION_ERROR] = position, rotation
-    near = options.tolerance or TOLERANCES.position * mechanism.characteristic_length
-    kept.rows.status[:] = np.where((position <= near) & (rotation <= options.rotation_tolerance), REACHED, PROJECTED)
-    return kept
 
 
 def _continue_turns(mechanism: Mechanism, rows: Rows, start: Floats) -> None:

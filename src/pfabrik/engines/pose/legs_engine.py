@@ -97,7 +97,7 @@ class LegsEngine(Engine):
         Unreachable targets get the nearest feasible pose found: with `keep_mode` in the working mode of the start, with
         `nearby` by a search around the start alone.
         """
-        answers = self._by_stages(targets, start, options, keep_mode, nearby)
+        answers = self.by_stages(targets, start, options, keep_mode, nearby)
         if options.most_steps or not keep_mode or not self._table.has_sides:
             return answers
         status = answers.rows.status
@@ -106,7 +106,7 @@ class LegsEngine(Engine):
             return answers
         answers = self._in_mode(answers, targets, start, options)
         for is_folded, begin in starts_beside(self.model, start):
-            others = self._by_stages(targets, begin, options, keep_mode, nearby)
+            others = self.by_stages(targets, begin, options, keep_mode, nearby)
             others = self._in_mode(others, targets, begin, options)
             better = np.flatnonzero(is_folded & self._is_nearer(others.rows, answers.rows, options))
             if len(better):
@@ -121,16 +121,27 @@ class LegsEngine(Engine):
             return answers
 
         def answer(target: Floats, begin: Configurations) -> Configurations:
-            return self._by_stages(target, begin, options, True, True)
+            return self.by_stages(target, begin, options, True, True)
 
         return kept(self.model, answers, targets, home_answer(self.model) if start is None else start, answer)
 
-    def _by_stages(
-        self, targets: Floats, start: Configurations | None, options: Options, keep_mode: bool, nearby: bool
+    def by_stages(
+        self,
+        targets: Floats,
+        start: Configurations | None,
+        options: Options,
+        keep_mode: bool,
+        nearby: bool,
+        *,
+        continues: bool = True,
     ) -> Configurations:
         """Answer targets by closed forms; then what these leave, in other modes, by searches, in joint coordinates.
 
         As `answer`, from a start on a fold in one of the modes that meet there.
+
+        Parameters
+        ----------
+        continues : implicit joints are led to far targets in small steps.
         """
         model, start_sides = self.model, self._sides_of(start)
         is_one = len(targets) == 1 and (start is None or (isinstance(start, LegAnswers) and len(start) == 1))
@@ -139,7 +150,9 @@ class LegsEngine(Engine):
             sides = start_sides.copy() if self._table.has_implicit_joints else start_sides
         n_unsolved = 0
         if not (is_one and self._reach_one(targets, start, sides, keep_mode, rows)):
-            n_unsolved, sides = reach(model, targets, start, start_sides, keep_mode, rows, is_tried=is_one)
+            n_unsolved, sides = reach(
+                model, targets, start, start_sides, keep_mode, rows, is_tried=is_one, continues=continues
+            )
         if self._keeps_apart:
             n_unsolved += mark_near(model, rows, sides)
         if not n_unsolved:
@@ -427,7 +440,10 @@ class GrownAnswers(NamedTuple):
         rows.poses[:] = in_lengths(known.poses, model.length)
         start = leg_answers(model, rows, known.sides, None, None, known.sides)
         options = Options(hold=None, most_steps=None if anew else STEPS_FROM_NEAR)
-        answers = self.engine.answer(targets, start, options, keep_mode=keep_mode, nearby=not anew)
+        if anew:
+            answers = self.engine.answer(targets, start, options, keep_mode=keep_mode)
+        else:
+            answers = self.engine.by_stages(targets, start, options, keep_mode, True, continues=False)
         status, measures = answers.rows.status, answers.rows.measures
         if keep_mode and not anew:
             status[~in_branch(model, answers, known.sides)] = FAILED

@@ -34,6 +34,7 @@ def reach(
     rows: Rows,
     *,
     is_tried: bool = False,
+    continues: bool = True,
 ) -> tuple[int, Floats]:
     """Solve for targets (n, 4, 4) by the legs' closed forms.
 
@@ -41,6 +42,7 @@ def reach(
     ----------
     sides : branches of the start with the coordinates of redundant joints, (n or 1, legs).
     is_tried : True if the only row has failed before; its status is set.
+    continues : implicit joints are led to far targets in small steps, if `keep_mode`.
 
     Returns
     -------
@@ -51,7 +53,7 @@ def reach(
     if model.legs.has_implicit_joints:
         sides = np.repeat(sides, len(targets), axis=0) if len(sides) == 1 else sides.copy()
     n_unsolved = 1 if is_tried else _reach_at_start(model, start is None, legs, targets, start_poses, sides, rows)
-    if n_unsolved and keep_mode and model.legs.has_implicit_joints:
+    if n_unsolved and continues and keep_mode and model.legs.has_implicit_joints:
         n_unsolved -= _continue_to(model, legs, targets, start_poses, sides, rows)
     if n_unsolved and model.legs.is_for_blocks and model.legs.task["unset"][0]:
         n_unsolved -= _complete(model, legs, targets, start_poses, sides, rows)

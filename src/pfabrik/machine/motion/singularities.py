@@ -173,6 +173,7 @@ def _sign_of(block: LoopBlock, conditions: Floats) -> Floats:
 def _parts(conditions: Floats, rows: Ints, columns: Ints, n_kept: int, n_idle: int) -> tuple[Floats, Floats, Floats]:
     """C, N and Z of a block, of `assembly_signs`, at loop conditions (n, 6 loops, c)."""
     C = conditions[:, rows][:, :, columns]
+    C = C * np.tile(np.repeat([1.0, AS_FORCES], 3), len(rows) // 6)[:, None]
     left, _, right = np.linalg.svd(C)
     right = np.swapaxes(right, 1, 2)
     return C, left[:, :, left.shape[2] - n_kept :], right[:, :, right.shape[2] - n_idle :]
@@ -245,6 +246,9 @@ def _block(conditions: Floats, is_on: Mask, loops: Ints, passive: Ints) -> LoopB
     regular = int((ranks == rank).argmax())
     return LoopBlock(rows, columns, kept[regular], idle[regular])
 
+
+AS_FORCES = 0.1
+"""Scale of lengths, so that forces count for more in N than their moments, which turn as the points of balls move."""
 
 TURNED_AWAY = 0.2
 """Volume that N, or Z, spans with its directions at home, below which nothing is said of its sign."""
