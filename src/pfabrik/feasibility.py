@@ -160,6 +160,16 @@ def margins_of_legs(mechanism: Mechanism, poses: Floats, configuration: Configur
     return margin, binding
 
 
+def margins_at(mechanism: Mechanism, answers: Configurations) -> tuple[Floats, Ints]:
+    """Margins (n,) of configurations that legs have found, as these stand there, and the indices of their limits."""
+    model, margin, binding = model_of(mechanism), np.empty(len(answers)), np.empty(len(answers), np.int64)
+    poses, sides = np.require(answers.rows.poses, requirements=["C", "W"]), sides_at(model, answers)
+    for row in range(len(answers)):
+        here = slice(row, row + 1)
+        margin[here], binding[here] = _margins(model, poses[here], poses[here], sides[here])
+    return margin, binding
+
+
 def _raise_to_kept(
     mechanism: Mechanism, poses: Floats, start: Configurations | None, margin: Floats, binding: Ints
 ) -> None:

@@ -98,9 +98,9 @@ def lines_between(
 def narrow(measure: Measure, lines: Lines, neighbours: Ints, close: float) -> Ints:
     """Bring `near` and `far` of lines as close to each other as `close` [share of the way]; the limits exceeded next.
 
-    Of what is grown, searches anew where they are quick, and from configurations of neighbouring lines that are turned
-    otherwise, then show whether anything leads farther out; lines where this is so are narrowed again, and asked about
-    again.
+    Where a point has many configurations, searches anew where they are quick, and from configurations of neighbouring
+    lines that are turned otherwise, then show whether anything leads farther out; lines where this is so are narrowed
+    again, and asked about again.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def narrow(measure: Measure, lines: Lines, neighbours: Ints, close: float) -> In
     question, pairs = measure.question, np.concatenate([neighbours, neighbours[:, ::-1]])
     changed = np.arange(len(lines.near))
     _narrow(measure, lines, changed, close)
-    for _ in range(ROUNDS if question.is_grown else 0):
+    for _ in range(ROUNDS if question.has_many_at_a_point else 0):
         on = changed if question.is_quick_anew else changed[:0]
         while len(on):
             on = _went_on(measure, lines, on, question.first_start, close, anew=True)

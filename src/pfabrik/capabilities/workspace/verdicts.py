@@ -18,7 +18,7 @@ from ...common.arrays import Floats, Ints, Mask
 from ...common.batch import put, take_each
 from ...common.rotations import from_rotvec
 from ...configuration import configuration
-from ...feasibility import feasibility, limits_of, margins_of_legs
+from ...feasibility import feasibility, limits_of, margins_at
 from ...ik import solve_ik
 from ...kinematics import (
     POSITION_ERROR,
@@ -44,9 +44,6 @@ INSIDE, OUTSIDE = 1.0, -1.0
 GEOMETRY = ("", "reach")
 """The limit of a border that no limit of a joint forms, where no closed form gives the leg."""
 
-
-HARDLY = 0.05
-"""By how much a limit is exceeded at most just beyond the border that it forms, as a share of its range."""
 
 AZIMUTHS, RING = 24, math.radians(6.0)
 """Number of directions of tilts to every side, and the largest step between tilts [rad]."""
@@ -105,6 +102,11 @@ class MapQuestion:
     def is_grown(self) -> bool:
         """True if known configurations lead from one point to the next; else each point is measured by itself."""
         return not self.has_margins and len(self.turns) == 1 and engine_of(self.mechanism).grower(self.hold) is not None
+
+    @property
+    def has_many_at_a_point(self) -> bool:
+        """True if a map is grown whose points have families of configurations: some lead farther than others do."""
+        return self.is_grown and (self.hold == "position" or bool(why_not_measured(self.mechanism)))
 
     @property
     def is_quick_anew(self) -> bool:
@@ -231,24 +233,20 @@ class MapQuestion:
             bindings = self.measure(points)[1]
         if self.has_margins or len(self.turns) > 1:
             return bindings
-        bindings = self._named_by_legs(points, bindings)
         rows = np.flatnonzero(bindings == self._unknown)
-        if not len(rows):
+        if self.is_grown and not self.has_many_at_a_point:
+            bindings[rows] = self._met(found.at(rows))
             return bindings
         ended = found.at(rows) if self.is_grown else self._answers(self.space.poses(points[rows]))[0]._configurations
         bindings[rows] = self._active(ended.coordinates)
         return bindings
 
-    def _named_by_legs(self, points: Floats, bindings: Ints) -> Ints:
-        """Bindings with those named that closed forms from the start tell: where they are hardly beyond a limit."""
-        if self.hold == "position" or why_not_measured(self.mechanism):
-            return bindings
-        start = None if self.start is None else self.start._configurations
-        margin, binding = margins_of_legs(self.mechanism, self.space.poses(points), start)
+    def _met(self, ended: Configurations) -> Ints:
+        """The limit that legs meet at each configuration, by its place in `limits`; that of reach if none."""
         place = {limit: index for index, limit in enumerate(self._known_limits)}
-        own = np.array([place.get(limit, self._unknown) for limit in limits_of(self.mechanism)])
-        is_told = (bindings == self._unknown) & (margin > -HARDLY) & (margin < 0.0)
-        return np.where(is_told, own[binding], bindings)
+        own = np.array([place.get(limit, self._unknown) for limit in (*limits_of(self.mechanism), GEOMETRY)])
+        margin, binding = margins_at(self.mechanism, ended)
+        return np.asarray(own[np.where(np.abs(margin) <= TOLERANCES.active, binding, -1)])
 
     def _active(self, coordinates: Floats) -> Ints:
         """The first limit that each row of joint coordinates is on, by its place in `limits`; that of reach if none."""

@@ -175,7 +175,7 @@ def kept(
 ) -> Configurations:
     """Replace answers in another working mode than their start by the result of continuation from the start."""
     branch = sides_at(model, start)
-    has_left = (answers.rows.status <= PROJECTED) & ~in_branch(model, answers, branch)
+    has_left = (answers.rows.status <= PROJECTED) & ~_is_in_mode(model, answers, branch)
     for row in np.flatnonzero(has_left):
         place = np.array([row])
         row_start, row_branch = (start, branch) if len(start) == 1 else (start.at(place), branch[place])
@@ -183,7 +183,7 @@ def kept(
     return answers
 
 
-def in_branch(model: Model, answers: Configurations, branch: Floats) -> Mask:
+def _is_in_mode(model: Model, answers: Configurations, branch: Floats) -> Mask:
     """True where no leg with two solutions is on another branch than in `branch`, (n,)."""
     return same_branch(sides_at(model, answers), branch * (model.legs.home_sides != 0.0))
 
@@ -195,7 +195,7 @@ def _continue_to(model: Model, target: Floats, start: Configurations, branch: Fl
     def advance(_rows: NDArray[np.intp], shares: Floats) -> Mask:
         nonlocal last
         trial = answer(between(start_pose, target, shares), last)
-        is_kept = (trial.rows.status == REACHED) & in_branch(model, trial, branch)
+        is_kept = (trial.rows.status == REACHED) & _is_in_mode(model, trial, branch)
         last = trial if is_kept[0] else last
         return np.asarray(is_kept)
 

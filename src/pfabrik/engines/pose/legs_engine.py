@@ -39,7 +39,7 @@ from ..joints.link_distances import too_near
 from ..joints.parasitic import has_other_assemblies
 from ..joints.projection import ProjectionMode, modes_of
 from .answers import LegAnswers, leg_answers, sides_at
-from .branch import answer_unreached, home_answer, in_branch, kept, poses_decide, starts_beside
+from .branch import answer_unreached, branch_of, home_answer, kept, poses_decide, same_branch, starts_beside
 from .coordinates import joint_coordinates
 from .forward import forward_kinematics
 from .leg_attempts import attempts
@@ -446,7 +446,8 @@ class GrownAnswers(NamedTuple):
             answers = self.engine.by_stages(targets, start, options, keep_mode, True, continues=False)
         status, measures = answers.rows.status, answers.rows.measures
         if keep_mode and not anew:
-            status[~in_branch(model, answers, known.sides)] = FAILED
+            there, here = branch_of(model, answers.rows.poses, sides_at(model, answers)), rows.poses
+            status[~same_branch(there, branch_of(model, here, known.sides))] = FAILED
         missed = status == PROJECTED
         measures[missed, POSITION_ERROR] = model.length * distances_of(model, answers.rows, options)[missed]
         return answers
