@@ -46,8 +46,8 @@ def reached_by_legs(
     engine = engine_of(mechanism)
     assert isinstance(engine, LegsEngine)
     rows, keep = new_rows(model_of(mechanism), len(targets)), start is not None
-    sides = engine._table.home_sides if start is None else sides_at(engine._model, start)
-    reach(engine._model, targets, start, sides, keep, rows)
+    sides = engine._table.home_sides if start is None else sides_at(engine.model, start)
+    reach(engine.model, targets, start, sides, keep, rows)
     return rows, engine._joint_space.answer(targets, start, Options(), keep_mode=keep).rows
 
 

@@ -1,0 +1,67 @@
+"""Dead points of linkages are told one loop at a time: with fingers side by side, and with balls for pins."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from pfabrik import Joint, Mechanism, Options, Status
+
+Z = (0, 0, 1)
+PIVOT, CRANK, ROD, PAD = np.array([16.0, 16]), np.array([26.0, 11]), np.array([6.0, -10]), np.array([36.0, 62])
+PINS = {
+    "rod0": (*ROD, "carriage", "rod"),
+    "rod1": (*CRANK, "rod", "driver"),
+    "drv0": (*PIVOT, "body", "driver"),
+    "drv1": (*PAD, "driver", "pad"),
+    "fol0": (6, 21, "body", "follow"),
+    "fol1": (26, 67, "follow", "pad"),
+}
+"""Of one finger: where its pins are, and what they join."""
+
+
+def gripper(sides: int, balls: tuple[str, ...]) -> Mechanism:
+    """A slide that drives fingers by rods, each with its pad on a parallelogram, mirrored; some pins are balls."""
+    joints = [Joint("slide", "prismatic", ("body", "carriage"), axis=(0, 1, 0), range=(-12, 12), actuated=True)]
+    for sign, k in ((-1, "L"), (1, "R"))[:sides]:
+        for name, (x, y, *bodies) in PINS.items():
+            one, other = (body if body in ("body", "carriage") else body + k for body in bodies)
+            kind = {"type": "spherical"} if name in balls else {"type": "revolute", "axis": Z}
+            joints.append(Joint(name + k, connects=(one, other), at=(sign * x, y, 0), **kind))
+    return Mechanism("gripper", joints, "padL", (-30, 92, 0), base="body", task=("x",))
+
+
+def end_of_travel() -> float:
+    """How far the left pad goes until its rod and crank are in line, at the first angle of either line-up [mm]."""
+    crank, rod, ends = np.linalg.norm(CRANK - PIVOT), np.linalg.norm(CRANK - ROD), []
+    for reach, sign in ((rod + crank, -1), (rod - crank, 1)):
+        pin = np.array([ROD[0], PIVOT[1] - np.sqrt(reach**2 - (PIVOT - ROD)[0] ** 2)])
+        aim = sign * (PIVOT - pin) / reach  # from the pivot to the pin of the crank: onward, or back
+        turn = np.arctan2(*aim[::-1]) - np.arctan2(*(CRANK - PIVOT)[::-1])
+        ends.append((turn + np.pi) % (2 * np.pi) - np.pi)
+    turn, arm = min(end for end in ends if end > 0), PAD - PIVOT
+    return float(arm[0] - (np.cos(turn) * arm[0] - np.sin(turn) * arm[1]))
+
+
+@pytest.mark.parametrize(
+    "balls", [(), ("rod1",), ("rod0", "rod1"), ("drv1",), ("fol0", "fol1"), ("rod0", "rod1", "fol1")]
+)
+@pytest.mark.parametrize("sides", [1, 2])
+def test_fingers_end_where_a_rod_is_in_line_with_its_crank(sides: int, balls: tuple[str, ...]) -> None:
+    machine, far = gripper(sides, balls), end_of_travel()
+    home = pf.solve_fk(machine, [0.0])
+    travel = pf.travel(home, along=(1, 0, 0))[0]
+    assert travel.why == "dead point" and travel.distance == pytest.approx(far, abs=1e-3)
+    out = np.arange(-30.0, 66.0, 3.0)
+    targets = np.stack([out, np.full(len(out), 92.0), np.zeros(len(out))], axis=1)
+    expected = out + 30.0 <= far
+    for answer in (
+        pf.solve_ik(machine, targets, start=home),
+        pf.solve_ik(machine, targets, options=Options(working_mode="keep")),
+    ):
+        np.testing.assert_array_equal(answer.status == Status.REACHED, expected)
+    there_and_back = pf.track(machine, np.concatenate([targets, targets[::-1]]), start=home)
+    np.testing.assert_array_equal(there_and_back.status == Status.REACHED, [*expected, *expected[::-1]])
+    pinned = [c.column for c in machine.coordinates if c.joint.type != "spherical"]  # rods between balls may turn
+    np.testing.assert_allclose(there_and_back.q[-1][pinned], 0.0, atol=1e-9)
