@@ -326,6 +326,8 @@ def _header(machine: Machine, made: Translated, parts: Sequence[str], path: Join
     if "bodies" in parts:
         lines += ["", "body      name"]
         lines += [f"{place:<9} {name}" for place, name in enumerate(machine.bodies.names)]
+    if machine.equal_rods:
+        lines += ["", f"Rods that count as equal to the other of their pair: {', '.join(machine.equal_rods)}."]
     lines += ["", "leg       joints"]
     lines += [f"{place:<9} {', '.join(leg.joints)}" for place, leg in enumerate(machine.legs, 1)]
     body = [f"   {comment(line)}".rstrip() for line in [*lines, "", *NOTICE.splitlines()]]
