@@ -172,7 +172,7 @@ def assert_same(machine: pf.Mechanism, answers: list[dict[str, Any]], expected: 
 
 
 def assert_limits(answers: list[dict[str, Any]], expected: pf.Solution) -> None:
-    """What holds projections back is named as in the library, but for stretched links: a page has no joint for these."""
+    """What holds projections back is named as in the library, but for stretched links: pages name no joint of these."""
     for answer, limits in zip(answers, expected.active_limits, strict=True):
         if answer["status"] == pf.Status.PROJECTED:
             named = [f"{limit.joint} {limit.bound}" for limit in limits if limit.bound != "stretched"]

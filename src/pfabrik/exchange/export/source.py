@@ -30,7 +30,10 @@ FARTHEST = (0.3, 0.5)
 """The largest distance of these poses from home [L, rad]."""
 
 N_TRIED = 400
-KEEP = Options(working_mode="keep")
+QUICKLY = Options(working_mode="keep", most_steps=40)
+"""What is asked of the library: answers that it reaches count, and of nearest poses that they are feasible; the
+search for the nearest of all takes a hundred times as long."""
+
 AGREEMENT: dict[Precision, float] = {"double": 1e-10, "float": 1e-4}
 """Tolerance to which actuators must agree [L or rad]: rounding may leave as much near a dead point."""
 
@@ -82,11 +85,11 @@ def _reached_around_home(mechanism: Mechanism) -> tuple[Floats, Solution]:
     targets = targets_around_home(mechanism, N_TRIED, np.random.default_rng(0))
     targets[0] = mechanism.home_pose
     within = targets[~(np.asarray(feasibility(mechanism, targets).margin) < 0.0)]
-    solution = solve_ik(mechanism, within, options=KEEP)
+    solution = solve_ik(mechanism, within, options=QUICKLY)
     if np.any(np.ravel(solution.status)[1:] == 0):
         return within, solution
-    nearest = np.ascontiguousarray(solve_ik(mechanism, targets, options=KEEP).pose)
-    return nearest, solve_ik(mechanism, nearest, options=KEEP)
+    nearest = np.ascontiguousarray(solve_ik(mechanism, targets, options=QUICKLY).pose)
+    return nearest, solve_ik(mechanism, nearest, options=QUICKLY)
 
 
 def _distances(solution: Solution) -> Floats:
@@ -109,7 +112,7 @@ def _are_unique(machine: Machine, targets: Floats, solution: Solution, is_inside
         starts += list(solution.q[rows])
     is_same = np.ones(len(targets), dtype=bool)
     for start in starts:
-        other = solve_ik(mechanism, targets, start=start, options=KEEP)
+        other = solve_ik(mechanism, targets, start=start, options=QUICKLY)
         is_same &= (other.status != 0) | (
             machine.largest_difference(other.actuators, solution.actuators) <= AGREEMENT["double"]
         )
