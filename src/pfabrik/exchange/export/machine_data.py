@@ -117,9 +117,7 @@ class Machine:
         self.hold_price, self.equal_rods = hold_price, equal_rods
         model = model_of(mechanism)
         if model.why_poses_do_not_suffice:
-            raise UnsupportedMechanism(
-                mechanism.name, [f"no legs in closed form, {model.why_poses_do_not_suffice}"], "exported"
-            )
+            raise UnsupportedMechanism(mechanism.name, [model.why_poses_do_not_suffice], "exported")
         table = model.legs
         self.mechanism, self.limits, self.cones = mechanism, table.limits, table.cones
         task = table.task[0]

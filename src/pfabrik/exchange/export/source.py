@@ -14,7 +14,7 @@ from ...common.arrays import Floats, Mask
 from ...configuration import configuration
 from ...feasibility import feasibility
 from ...ik import solve_ik
-from ...kinematics import JointPath, generic_of
+from ...kinematics import JointPath, engine_of, generic_of
 from ...machine.description.mechanism import Mechanism
 from ...machine.poses import pose
 from ...options import Options
@@ -30,8 +30,8 @@ FARTHEST = (0.3, 0.5)
 """The largest distance of these poses from home [L, rad]."""
 
 N_TRIED = 400
-QUICKLY = Options(working_mode="keep", most_steps=40)
-"""What is asked of the library: answers that it reaches count, and of nearest poses that they are feasible; the
+MOST_STEPS = 40
+"""Most steps of the library's searches: answers that it reaches count, and of nearest poses that they are feasible; the
 search for the nearest of all takes a hundred times as long."""
 
 AGREEMENT: dict[Precision, float] = {"double": 1e-10, "float": 1e-4}
@@ -82,14 +82,19 @@ def _reached_around_home(mechanism: Mechanism) -> tuple[Floats, Solution]:
 
     Of a mechanism with fewer freedoms than its task sets, which reaches home alone of these, the nearest poses.
     """
-    targets = targets_around_home(mechanism, N_TRIED, np.random.default_rng(0))
+    asked, targets = _options(mechanism), targets_around_home(mechanism, N_TRIED, np.random.default_rng(0))
     targets[0] = mechanism.home_pose
     within = targets[~(np.asarray(feasibility(mechanism, targets).margin) < 0.0)]
-    solution = solve_ik(mechanism, within, options=QUICKLY)
+    solution = solve_ik(mechanism, within, options=asked)
     if np.any(np.ravel(solution.status)[1:] == 0):
         return within, solution
-    nearest = np.ascontiguousarray(solve_ik(mechanism, targets, options=QUICKLY).pose)
-    return nearest, solve_ik(mechanism, nearest, options=QUICKLY)
+    nearest = np.ascontiguousarray(solve_ik(mechanism, targets, options=asked).pose)
+    return nearest, solve_ik(mechanism, nearest, options=asked)
+
+
+def _options(mechanism: Mechanism) -> Options:
+    """What is asked of the library, in home's mode; some of its engines do not count steps."""
+    return Options(working_mode="keep", most_steps=MOST_STEPS if engine_of(mechanism).bounds_steps else None)
 
 
 def _distances(solution: Solution) -> Floats:
@@ -112,7 +117,7 @@ def _are_unique(machine: Machine, targets: Floats, solution: Solution, is_inside
         starts += list(solution.q[rows])
     is_same = np.ones(len(targets), dtype=bool)
     for start in starts:
-        other = solve_ik(mechanism, targets, start=start, options=QUICKLY)
+        other = solve_ik(mechanism, targets, start=start, options=_options(mechanism))
         is_same &= (other.status != 0) | (
             machine.largest_difference(other.actuators, solution.actuators) <= AGREEMENT["double"]
         )
