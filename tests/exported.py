@@ -43,8 +43,8 @@ WITHOUT_NEAREST: Any = ("ik", "limits", "fk", "rates")
 REFUSED = {
     "nrpm": "poses leave joints A1, B1",
     "H4": "singular at home, where joints Q1, Q2",
-    "panda": "a joint between the ends of its rod",
-    "snake60": "a joint between the ends of its rod",
+    "panda": "between the ends of its rod, is not along it",
+    "snake60": "between the ends of its rod, is not along it",
 }
 """Machines that have no code, and what the refusal says."""
 

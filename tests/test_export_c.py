@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import shutil
 import subprocess
@@ -45,6 +46,7 @@ from pfabrik.exchange.export.export_c import PARTS, c_source
 from pfabrik.exchange.export.static_data import in_words
 from pfabrik.machine.description.task import task_of
 from pfabrik.machine.files import dumps, loads
+from test_actuation import waist
 
 ROUNDED = 1e-6
 """How far a pose is off in single precision after some ten roundings [L or rad]."""
@@ -352,6 +354,22 @@ def test_chains_without_code_are_refused_by_name_and_nothing_is_written(name: st
     assert said in str(caught.value)
     assert "cannot be exported" in str(caught.value)
     assert not list(tmp_path.iterdir())
+
+
+def test_what_a_refusal_says_would_help_helps() -> None:
+    """Redundant joints that are fixed; the body above the joint that carries a pivot, as the base."""
+    redundant = machine("nrpm")
+    fixed = [
+        pf.Joint(each.name, "fixed", each.connects, each.at or (0, 0, 0)) if each.name[0] in "AB" else each
+        for each in redundant.joints
+    ]
+    assert "pfk_ik(" in c_source(dataclasses.replace(redundant, joints=fixed), parts=["ik"])
+    whole = waist()
+    with pytest.raises(UnsupportedMechanism, match="body that joint yaw carries as the base"):
+        c_source(whole)
+    (carried,) = {*whole.joint("yaw").connects} - {whole.base}
+    above = [each for each in whole.joints if each.name != "yaw"]
+    assert "pfk_ik(" in c_source(dataclasses.replace(whole, joints=above, base=carried), parts=["ik"])
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from checks import actuator_units
 from oracles import no_poses
 from pfabrik.cli import main
 from pfabrik.common.memory_image import packed
@@ -30,10 +31,13 @@ from pfabrik.view.page.export_web import FOLDER, SCRIPTS, machine_data, web_page
 NODE = shutil.which("node")
 needs_node = pytest.mark.skipif(NODE is None, reason="needs Node.js, which is not installed")
 
-N = 12
+N, MOST = 12, 400
 NEAR = 1e-6
 """Difference of poses that two searches may end at [L, or entries of rotations]: the sines of JavaScript differ in the
 last digits, which far poses at flat optima show a thousandfold."""
+
+NEAR_DRIVES = 1e-5
+"""Difference of actuators [L or rad], which is as large as that of poses times their slopes."""
 
 NEAR_RATIO = 1e-4
 """Relative difference of measures of singularity: a page takes differences of answers."""
@@ -119,16 +123,27 @@ def answered(name: str) -> dict[str, Any]:
     """What the page of a machine answers, in Node.js."""
     targets, path, values = asked(name)
     spoiled = no_poses(loaded(name).home_pose)
+    return ask(
+        name,
+        targets,
+        path=path.reshape(-1, 16).tolist(),
+        values=values.tolist(),
+        link=link_to(path[0]),
+        edges=edges_of(loaded(name)).reshape(-1, 16).tolist(),
+        spoiled=np.where(np.isnan(spoiled), None, spoiled).reshape(-1, 16).tolist(),
+    )
+
+
+def ask(name: str, targets: Any, **more: Any) -> dict[str, Any]:
+    """What the page of a machine answers to targets, and to more."""
     question = {
         "kernels": packed((FOLDER / "kernels.wasm").read_bytes()),
         "machine": machine_data(model_of(loaded(name))),
         "targets": targets.reshape(-1, 16).tolist(),
-        "path": path.reshape(-1, 16).tolist(),
-        "values": values.tolist(),
-        "link": link_to(path[0]),
         "listed": targets_of(loaded(name), 1, 5).ravel().tolist(),
-        "edges": edges_of(loaded(name)).reshape(-1, 16).tolist(),
-        "spoiled": np.where(np.isnan(spoiled), None, spoiled).reshape(-1, 16).tolist(),
+        "link": link_to(loaded(name).home_pose),
+        **{what: [] for what in ("path", "values", "edges", "spoiled")},
+        **more,
     }
     scripts = [str(FOLDER / "web" / f"{each}.js") for each in SCRIPTS[: SCRIPTS.index("session") + 1]]
     text = re.sub(r"\bInfinity\b", "1e999", json.dumps(question))
@@ -145,12 +160,35 @@ def link_to(pose: Any) -> str:
 
 
 def assert_same(machine: pf.Mechanism, answers: list[dict[str, Any]], expected: pf.Solution) -> None:
-    """Statuses equal, poses within `NEAR`."""
+    """Statuses equal, poses within `NEAR`, actuators within `NEAR_DRIVES`."""
     assert [answer["status"] for answer in answers] == np.atleast_1d(expected.status).astype(int).tolist()
     poses = np.array([answer["pose"] for answer in answers]).reshape(-1, 4, 4)
     scale = np.ones((4, 4))
     scale[:3, 3] = machine.characteristic_length
     assert (np.abs(poses - expected.pose) / scale).max() <= NEAR
+    given = [each or [np.nan] * len(machine.drives) for each in (answer["actuators"] for answer in answers)]
+    off = np.abs(np.array(given) - expected.actuators) / actuator_units(machine)
+    assert np.nanmax(off, initial=0.0) <= NEAR_DRIVES
+
+
+def assert_limits(answers: list[dict[str, Any]], expected: pf.Solution) -> None:
+    """What holds projections back is named as in the library, but for stretched links: pages name no joint of these."""
+    for answer, limits in zip(answers, expected.active_limits, strict=True):
+        if answer["status"] == pf.Status.PROJECTED:
+            named = [f"{limit.joint} {limit.bound}" for limit in limits if limit.bound != "stretched"]
+            assert answer["limits"] == named
+
+
+@needs_node
+@pytest.mark.parametrize(
+    "name", ["nrpm", *(pytest.param(name, marks=pytest.mark.campaign) for name in MACHINES if name != "nrpm")]
+)
+def test_pages_answer_many_targets_as_the_library_does(name: str) -> None:
+    """Arms of redundant machines too: they rest where their start has them."""
+    targets = targets_of(loaded(name), MOST, 11)
+    expected, told = pf.solve_ik(loaded(name), targets), ask(name, targets)["inverse"]
+    assert_same(loaded(name), told, expected)
+    assert_limits(told, expected)
 
 
 @needs_node
@@ -160,10 +198,7 @@ def test_a_page_answers_as_the_library_does(name: str) -> None:
     machine, told, (targets, path, values) = pf.load(name), answered(name), asked(name)
     expected = pf.solve_ik(machine, targets)
     assert_same(machine, told["inverse"], expected)
-    for answer, limits in zip(told["inverse"], expected.active_limits, strict=True):
-        if answer["status"] == pf.Status.PROJECTED:  # of links that are stretched out it does not say at which joint
-            named = [f"{limit.joint} {limit.bound}" for limit in limits if limit.bound != "stretched"]
-            assert answer["limits"] == named
+    assert_limits(told["inverse"], expected)
     assert_same(machine, told["forward"], pf.solve_fk(machine, values))
     home = last = pf.solve_ik(machine, machine.home_pose)
     reached = [home]

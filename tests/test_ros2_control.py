@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -35,13 +37,19 @@ def package(name: str, tmp_path: Path) -> Path:
     return pf.export_ros2_control(machine(name), tmp_path / "leg_transmission", joints=MACHINES[name][0])
 
 
-def mapped(folder: Path, rows: np.ndarray, n_joints: int, n_actuators: int) -> tuple[np.ndarray, np.ndarray]:
-    """Values of actuators, and back of joints, as (rows, 3, n): positions, velocities, efforts."""
-    stubs, built = DATA / "ros2_stubs", folder / "built"
+def mapped(
+    folder: Path, rows: np.ndarray, n_joints: int, n_actuators: int, headers: Sequence[Path] = ()
+) -> tuple[np.ndarray, np.ndarray]:
+    """Values of actuators, and back of joints, as (rows, 3, n): positions, velocities, efforts.
+
+    Headers are looked for in these folders, then among the stubs.
+    """
+    built = folder / "built"
+    includes = [word for each in (*headers, DATA / "ros2_stubs") for word in ("-isystem", str(each))]
     built.mkdir()
     commands = [
         ["gcc", "-std=c99", *STRICT, "-c", str(folder / "src/leg_kinematics.c"), "-o", str(built / "kinematics.o")],
-        ["g++", "-std=c++17", *STRICT, "-I", str(stubs), "-I", str(folder / "include"),
+        ["g++", "-std=c++17", *STRICT, *includes, "-I", str(folder / "include"), "-DFMT_HEADER_ONLY",
          str(folder / "src/leg_transmission.cpp"), str(DATA / "run_transmission.cpp"), str(built / "kinematics.o"),
          "-o", str(built / "run"), "-lm"],
     ]  # fmt: skip
@@ -61,13 +69,38 @@ def mapped(folder: Path, rows: np.ndarray, n_joints: int, n_actuators: int) -> t
     "name", [*OFTEN, *(pytest.param(n, marks=pytest.mark.campaign) for n in MACHINES if n not in OFTEN)]
 )
 def test_joints_to_actuators_and_back_is_where_it_began_and_power_is_conserved(name: str, tmp_path: Path) -> None:
+    check_there_and_back(name, tmp_path)
+
+
+@needs_compilers
+@pytest.mark.campaign
+@pytest.mark.parametrize("branch", ["jazzy", "master"])
+def test_so_it_does_against_the_headers_of_ros2_control(branch: str, tmp_path: Path) -> None:
+    """All but the macro that makes a plugin of it."""
+    control = fetched("ros-controls/ros2_control", tmp_path, "--branch", branch)
+    packages = [control / each for each in ("transmission_interface", "hardware_interface", "joint_limits")]
+    packages += [fetched(each, tmp_path) for each in ("ros2/rcpputils", "fmtlib/fmt")]
+    check_there_and_back("g1_ankle", tmp_path, [each / "include" for each in packages])
+
+
+def fetched(repository: str, folder: Path, *options: str) -> Path:
+    """A copy of a repository."""
+    place = folder / repository.replace("/", "+")
+    line = ["git", "clone", "--quiet", "--depth", "1", *options, f"https://github.com/{repository}.git", str(place)]
+    run = subprocess.run(line, capture_output=True, text=True, env=os.environ | {"GIT_TERMINAL_PROMPT": "0"})
+    if run.returncode != 0:
+        pytest.skip(f"{repository} is not to be had here: {run.stderr.strip()}")
+    return place
+
+
+def check_there_and_back(name: str, tmp_path: Path, headers: Sequence[Path] = ()) -> None:
     mechanism, (names, reach) = machine(name), MACHINES[name]
     path, n, n_a = joint_path(mechanism, names), len(reach), len(mechanism.actuator_names)
     values = np.random.default_rng(0).uniform(-1.0, 1.0, (40, 3, n))
     values[:, 0] = path.home + 0.1 + values[:, 0] * reach  # an offset of 0.1 of every joint
     rows = np.concatenate([values, np.zeros((3, 3, n))])
     rows[41, 0, 0], rows[42, 0] = np.nan, 1.5
-    actuators, joints = mapped(package(name, tmp_path), rows.reshape(43, -1), n, n_a)
+    actuators, joints = mapped(package(name, tmp_path), rows.reshape(43, -1), n, n_a, headers)
     assert np.isfinite(actuators[40]).all() and np.isnan(actuators[41]).any()  # what is not finite is passed on
     if name == "g1_ankle":  # out of reach: nothing is written over the values before
         np.testing.assert_array_equal(actuators[42], actuators[41])

@@ -33,8 +33,11 @@ DATA = Path(__file__).parent / "data"
 needs_compilers = pytest.mark.skipif(
     not (shutil.which("gcc") and shutil.which("g++")), reason="no compilers of C and C++ here: gcc, g++"
 )
-SURE = "steps=200", "starts=24"
-"""Parameters with which the search finds what the library does."""
+FAR = "open_loop=true", "largest_step=0"
+"""Parameters with which targets anywhere are commanded, from home on."""
+
+SURE = *FAR, "steps=200", "starts=24"
+"""And the search finds what the library does."""
 
 MACHINES = ("stewart", "linear_delta", "five_bar")
 """Struts between U and S; carriages with rods between balls, whose orientation is not set; a tip that is a joint."""
@@ -147,9 +150,11 @@ def test_a_node_answers_as_the_library_does_in_reach_and_out_of_it(name: str) ->
         start, report = expected.q, answer["rig: target"]
         assert report["message"].partition(":")[0] == expected.status.name
         assert report["level"] == int(not expected)
-        for limit in expected.active_limits:  # where a leg is stretched, one of these alone is named
-            active = report["active limits"]
-            assert f"{limit.joint} {limit.bound} " in active or active.startswith("stretched: the leg of ")
+        for limit in expected.active_limits:  # of stretched legs one alone is named, of links the nearest two
+            active, named = answer["rig: limits"]["message"], f"{limit.joint} {limit.bound} "
+            of_links = limit.bound == "clearance" and " clearance " in active
+            assert named in active or of_links or active.startswith("stretched: the leg of ")
+        assert answer["rig: limits"]["level"] == int(answer["rig: limits"]["message"] != "none is active")
         far = float(report["distance from target [m]"]), float(report["rotation from target [rad]"])
         expected_far = expected.position_error * metres, expected.rotation_error
         np.testing.assert_allclose(far, expected_far, rtol=1e-5, atol=1e-6 * size * metres)
@@ -210,7 +215,7 @@ def test_what_is_no_target_is_refused_and_out_of_reach_may_hold() -> None:
     good, far = line_of(near, metres), line_of(away, metres)
     bad = [good.replace("base", "world"), "base nan 0 0.2 0 0 0 1", "base 0 0 inf 0 0 0 1", "base 0 0 0.2 0 0 0 0"]
     bad += ["base 0 0 0.2 0 0 nan 1", "base 0 0 0.2 0 0 0 1.1"]
-    said = answers("stewart", [*bad, far, good, "measure", far], "out_of_reach=hold")
+    said = answers("stewart", [*bad, far, good, "measure", far], *FAR, "out_of_reach=hold")
     for answer in said[: len(bad)]:
         assert answer["rig: target"]["message"].startswith("REFUSED: ") and answer["rig: target"]["level"] == 2
         assert not {"command", "achieved"} & {*answer}
@@ -218,13 +223,11 @@ def test_what_is_no_target_is_refused_and_out_of_reach_may_hold() -> None:
     for held in (said[len(bad)], said[-1]):
         assert held["rig: target"]["message"].startswith("HELD: beyond a limit: joint B")
         assert not {"command", "achieved"} & {*held}
-    (alone,) = answers("stewart", [good])
+    (alone,) = answers("stewart", [good], *FAR)
     kept = said[len(bad) + 1]
     assert kept["rig: target"]["message"] == "REACHED" and kept["command"] == alone["command"]
     assert said[-1]["rig: target"]["REFUSED"] == "6" and said[-1]["rig: target"]["HELD"] == "2"
     assert said[-1]["tf"] == kept["achieved"] and said[-1]["rig: actuators"]["level"] == 0
-    (jump,) = answers("stewart", [far], "largest_step=0.01")
-    assert jump["rig: target"]["message"].startswith("REFUSED: a jump of an actuator: B") and "command" not in jump
     (measured,) = answers("stewart", ["measure"], "show=measured")
     assert measured["rig: actuators"]["message"] == "no position of BL1"
     for wrong, expected in (
@@ -232,6 +235,7 @@ def test_what_is_no_target_is_refused_and_out_of_reach_may_hold() -> None:
         ("show_rate=0", "show_rate: found 0; expected 0.001 to 1000"),
         ("largest_step=-1", "largest_step: found -1; expected 0 to 1e+06"),
         ("largest_step=nan", "largest_step: found nan"),
+        ("states_timeout=-1", "states_timeout: found -1; expected 0 to 1e+06"),
         ("steps=0", "steps: found 0; expected 1 to 10000"),
         ("starts=-1", "starts: found -1; expected 0 to 10000"),
         ("starts=3000000000", "starts: found 3000000000"),
@@ -245,13 +249,47 @@ def test_actuators_may_be_measured_in_parts() -> None:
     """By several broadcasters on one topic: what one of them leaves out, or another machine's, is no fault."""
     mechanism = machine("stewart")
     parts = ["BL1 BL2", "another", "BR3 another BL3 BR1 BR2", "another", "BL1"]
-    good, *said = answers("stewart", [line_of(mechanism.home_pose, 1e-3), *(f"measure {part}" for part in parts)])
+    lines = [line_of(mechanism.home_pose, 1e-3), *(f"measure {part}" for part in parts)]
+    good, *said = answers("stewart", lines, *FAR)
     for answer in said[:2]:
         assert answer["rig: actuators"] == {"level": 2, "message": "no position of BL3"} and "pose" not in answer
     for answer in said[2:]:
         assert answer["rig: actuators"] == {"level": 0, "message": "measured"}
     assert ["pose" in answer for answer in said[2:]] == [True, False, True]
     np.testing.assert_allclose([said[2]["pose"], said[4]["pose"]], [good["achieved"]] * 2, atol=1e-12)
+
+
+@needs_compilers
+@pytest.mark.parametrize("name", MACHINES)
+def test_a_node_begins_where_the_machine_stands_and_refuses_leaps_and_states_that_stop(name: str) -> None:
+    """From measured actuators, not from home; after states have stopped it begins from them anew."""
+    mechanism, metres = machine(name), metres_of(machine(name).length_unit)
+    lengths, length = np.array([drive.kind != "angle" for drive in mechanism.drives]), mechanism.characteristic_length
+    near, away = mechanism.home_pose.copy(), mechanism.home_pose.copy()
+    at, size = int(mechanism.drives[0].kind == "angle"), 0.04 * length  # a five-bar stands in its plane
+    near[at, 3] += 2.0 * size
+    away[at, 3] += 3.0 * size
+    there, here = (pf.solve_ik(mechanism, place).actuators * np.where(lengths, metres, 1.0) for place in (away, near))
+    states = "states " + " ".join(map(repr, there.tolist()))
+    line = line_of(near, metres, mechanism.base)
+    allowed = 1.01 * np.abs((there - here) / np.where(lengths, length * metres, 1.0)).max()
+    guard, first = f"largest_step={allowed}", mechanism.actuator_names[0]
+    said = answers(name, [line, states, line, "wait 0.6", line, states, line], guard)
+    assert said[0]["rig: target"]["message"] == f"REFUSED: no position of {first}"
+    assert said[0]["rig: actuators"] == {"level": 2, "message": f"no position of {first}"}
+    np.testing.assert_allclose(matrix(said[1]["tf"], metres), away, atol=1e-6 * length)  # it shows where that is
+    for answer in (said[2], said[6]):
+        assert answer["rig: target"]["message"] == "REACHED", answer
+        np.testing.assert_allclose(answer["command"], here, atol=1e-9 * length)
+    assert said[3]["rig: actuators"] == {"level": 3, "message": f"no position of {first} for 0.6 s"}
+    assert said[4]["rig: target"]["message"] == f"REFUSED: no position of {first} for 0.6 s"
+    assert not {"command", "achieved"} & ({*said[0]} | {*said[4]})
+    back = line_of(mechanism.home_pose, metres, mechanism.base)
+    _, leap = answers(name, [states, back], guard)
+    assert leap["rig: target"]["message"].startswith("REFUSED: a jump of an actuator: ") and "command" not in leap
+    assert "; largest_step allows " in leap["rig: target"]["message"]
+    *_, kept = answers(name, [states, line, "wait 0.6", line], guard, "states_timeout=0")
+    assert kept["rig: target"]["message"] == "REACHED"
 
 
 def test_a_package_is_complete_and_names_are_one(tmp_path: Path) -> None:
@@ -264,6 +302,7 @@ def test_a_package_is_complete_and_names_are_one(tmp_path: Path) -> None:
     ast.parse(files["launch/my_delta.launch.py"])
     parameters = yaml.safe_load(files["config/params.yaml"])["/**/my_delta"]["ros__parameters"]
     assert {name for name in parameters if f'"{name}"' in files["src/my_delta_node.cpp"]} == {*parameters}
+    assert parameters["largest_step"] == 0.1 and parameters["states_timeout"] == 0.5
     assert parameters["base_frame"] == "base" and parameters["out_of_reach"] == "project"
 
 

@@ -24,8 +24,8 @@ from pfabrik.machine.motion.joint_path import joint_path, passive_series
 
 REFUSED = {
     "nrpm": "poses leave joints A1, B1",
-    "panda": "a joint between the ends of its rod",
-    "snake60": "a joint between the ends of its rod",
+    "panda": "between the ends of its rod, is not along it",
+    "snake60": "between the ends of its rod, is not along it",
     "serial_arm": "legs on joints J3",
 }
 NAMES = [name for name in pf.catalog() if name not in REFUSED]

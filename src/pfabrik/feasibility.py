@@ -120,7 +120,7 @@ def feasibility(
     model = measured(model_of(checked_mechanism(mechanism)))
     configuration = None if start is None else start_of(mechanism, start, ())
     if model.why_poses_do_not_suffice:
-        raise UnsupportedMechanism(mechanism.name, [f"no legs in closed form, {model.why_poses_do_not_suffice}"])
+        raise UnsupportedMechanism(mechanism.name, [model.why_poses_do_not_suffice])
     poses, shape = as_targets(mechanism, targets)
     if executor is None:
         margin, binding = _best_of_modes(mechanism, poses, configuration)

@@ -1,6 +1,7 @@
 // Runs an exported node in the stub of rclcpp. Arguments are its parameters, name=value; each line of input is a target,
-// a frame and seven numbers, or "measure" and the joints in the message: without any, all of them. Writes one line of JSON after each: the last message of every topic that had
-// one since.
+// a frame and seven numbers; or "measure" and the joints in the message, without any all of them, as they were last
+// commanded; or "states" and a position of every actuator; or "wait" and seconds. Writes one line of JSON after each: the
+// last message of every topic that had one since.
 #include <iostream>
 #include <sstream>
 
@@ -92,10 +93,11 @@ int main(int argc, char ** argv)
   for (int i = 1; i < argc; ++i) {
     const std::string text(argv[i]), name = text.substr(0, text.find('=')), value = text.substr(text.find('=') + 1);
     const bool is_integer = name == "steps" || name == "starts";
-    const bool is_number = name == "largest_step" || name == "show_rate";
-    world().parameters[name] = is_integer ? std::any(std::int64_t{std::stoll(value)})
-                               : is_number ? std::any(std::stod(value))
-                                           : std::any(value);
+    const bool is_number = name == "largest_step" || name == "show_rate" || name == "states_timeout";
+    world().parameters[name] = is_integer           ? std::any(std::int64_t{std::stoll(value)})
+                               : is_number           ? std::any(std::stod(value))
+                               : name == "open_loop" ? std::any(value == "true")
+                                                     : std::any(value);
   }
   if (node_main(0, nullptr) != 0) {  // whose node is gone: its callbacks are those of the next
     return 2;
@@ -104,7 +106,11 @@ int main(int argc, char ** argv)
     std::cout << name << " is not read-only\n";
     return 3;
   }
-  world() = World{world().parameters, {}, {}, {}, {}, {}};
+  for (const auto & name : world().unsaid) {
+    std::cout << name << " has no description\n";
+    return 3;
+  }
+  world() = World{world().parameters, {}, {}, {}, {}, {}, {}, 0.0};
   const rig_node::Node node;
   sensor_msgs::msg::JointState measured;
   std::string line, word;
@@ -119,6 +125,17 @@ int main(int argc, char ** argv)
         part.position.push_back(measured.position.at(static_cast<std::size_t>(at)));
       }
       send("~/actuator_states", part.name.empty() ? measured : part);
+    } else if (word == "states") {
+      measured = {};
+      for (const auto & actuator : rig_node::kActuatorTable) {
+        words >> word;
+        measured.name.emplace_back(actuator.name);
+        measured.position.push_back(std::stod(word));
+      }
+      send("~/actuator_states", measured);
+    } else if (word == "wait") {
+      words >> word;
+      world().seconds += std::stod(word);
     } else {
       geometry_msgs::msg::PoseStamped target;
       double values[7];

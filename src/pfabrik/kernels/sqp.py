@@ -44,6 +44,11 @@ from .search_constants import (
     SUFFICIENT,
 )
 
+DAMPED = 0.0
+"""Damping made a step short if the damping times the squared step, times this, is more than the predicted reduction:
+that this is small then ends no descent. 0: never, for in double precision predictions that end one are far smaller; 2
+in single precision."""
+
 TOTALS = np.dtype(
     [
         ("value", "f8"),  # of the objective
@@ -70,6 +75,7 @@ CONTROL = np.dtype(
         ("is_done", "i8"),  # 1 if the descent is over
         ("is_rejected", "i8"),  # 1 if the last step was rejected
         ("is_exact", "i8"),  # 1 if its actual reduction was as predicted
+        ("is_damped", "i8"),  # 1 if damping made the last step short
         ("is_restoring", "i8"),  # 1 if feasibility is restored after each step
         ("closed", "f8"),  # objective at the last feasible configuration
     ]
@@ -234,6 +240,16 @@ def solve_subproblem(
 
 
 @routine
+def square_of(metric: Floats, x: Floats, n: int) -> float:
+    """x M x, of the lower triangle of M."""
+    total = 0.0
+    for a in range(n):
+        for b in range(a + 1):
+            total += (1.0 if a == b else 2.0) * x[a] * metric[a, b] * x[b]
+    return total
+
+
+@routine
 def is_last(linear: Linearisation, other: Linearisation, predicted: float, previous: float) -> bool:
     """True if a step had so small a predicted reduction that no further step is worth taking.
 
@@ -308,6 +324,8 @@ def plan_step(linear: Linearisation, hessian: Hessian, control: Record, most_ste
     control["steps"] += 1
     control["predicted_before"] = control["predicted"]
     predicted, damping = solve_subproblem(linear, hessian, control["damping"], control["largest"], p)
+    resisted = DAMPED * damping * square_of(linear.metric, p.x, linear.totals[0]["motions"])
+    control["is_damped"] = int(max(predicted, 0.0) < resisted)
     multipliers = control["equation_multipliers"] + sum_of_multipliers(p.multipliers, linear.totals[0]["limits"])
     control["weight"] = max(LEAST_WEIGHT, 2.0 * multipliers)
     predicted += control["weight"] * violation(linear)
@@ -341,7 +359,9 @@ def judge_step(linear: Linearisation, other: Linearisation, is_feasible: bool, s
     """True if a share of the planned step is accepted; updates damping by its actual and predicted reduction."""
     predicted, actual = share * control["predicted"], actual_reduction(linear, other, control)
     is_accepted = is_feasible and is_sufficient(linear, actual, predicted, control["weight"])
-    if is_last(linear, other, predicted, control["predicted_before"]):
+    is_damped = is_accepted and control["is_damped"] == 1
+    previous = math.inf if is_damped else control["predicted_before"]
+    if is_last(linear, other, predicted, previous):
         control["is_done"] = 1
     control["predicted"], control["is_exact"] = (
         predicted,
@@ -350,7 +370,9 @@ def judge_step(linear: Linearisation, other: Linearisation, is_feasible: bool, s
     damping, largest = control["damping"], control["largest"]
     if not is_accepted:
         control["damping"] = max(4.0 * damping, LEAST_DAMPING * largest)
-    elif actual > GOOD * predicted and control["is_rejected"] == 0:
+    elif (actual > GOOD * predicted and control["is_rejected"] == 0) or (
+        is_damped and predicted <= FINE * linear.totals[0]["value"]
+    ):
         damping *= 0.01 if damping < LARGE_DAMPING * largest and share == 1.0 and control["is_exact"] == 1 else 0.1
         control["damping"] = damping if damping > 1e-8 * largest else 0.0
     control["is_rejected"] = 0 if is_accepted else 1

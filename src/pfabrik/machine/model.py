@@ -98,10 +98,11 @@ class Model:
 
     @property
     def why_poses_do_not_suffice(self) -> str:
-        """The reason why a pose does not determine the coordinates of legs; empty if it does."""
+        """The reason why a pose does not determine the coordinates of legs, and what would help; empty if it does."""
         if self.has_legs and self.legs.has_free_redundant:
-            return f"poses leave joints {', '.join(self.legs.redundant_joints)} open"
-        return self.why_no_legs
+            joints = ", ".join(self.legs.redundant_joints)
+            return f"poses leave joints {joints} open, which are redundant: where these are fixed, closed forms answer"
+        return f"no legs in closed form, {self.why_no_legs}" if self.why_no_legs else ""
 
     @cached_property
     def _legs(self) -> LegTable | str:

@@ -125,9 +125,7 @@ def certify(
     mechanism = _with_limits_of(checked_mechanism(mechanism), limits)
     model = model_of(mechanism)
     if model.why_poses_do_not_suffice:
-        raise UnsupportedMechanism(
-            mechanism.name, [f"no legs in closed form, {model.why_poses_do_not_suffice}"], "certified"
-        )
+        raise UnsupportedMechanism(mechanism.name, [model.why_poses_do_not_suffice], "certified")
     gap, budget, uncertain = _checked(tolerance, budget, uncertain)
     poses = None if isinstance(region, PoseRegion) else _steps(mechanism, region)
     if isinstance(region, PoseRegion):

@@ -142,7 +142,7 @@ def _enclosure(question: MapQuestion, accuracy: float, tell: OnProgress | None) 
     """The size of a workspace between two proved bounds."""
     model, space = model_of(question.mechanism), question.space
     if model.why_poses_do_not_suffice:
-        reason = f"no legs in closed form, {model.why_poses_do_not_suffice}"
+        reason = model.why_poses_do_not_suffice
         raise UnsupportedMechanism(question.mechanism.name, [reason], "enclosed")
     ends = question.lowest, question.highest
     return enclose(

@@ -79,7 +79,7 @@ def _varied(mechanism: Mechanism, names: tuple[str, ...]) -> VariedMachine:
     if "_source" not in mechanism.__dict__:
         reason = "it was not read from a file with dimensions"
     elif model.why_poses_do_not_suffice:
-        reason = f"no legs in closed form, {model.why_poses_do_not_suffice}"
+        reason = model.why_poses_do_not_suffice
     elif measured(model) is not model:
         reason = "one leg places its end effector as a point"
     elif mechanism.clearance is not None:

@@ -16,6 +16,7 @@ from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.motion.fitting_task import leaves_a_choice
 from ...options import USUAL
 from .driven_bodies import unplaced_masses
+from .equal_rods import with_equal_rods
 from .machine_data import Machine, fitting_path
 from .source import source
 from .static_data import Precision
@@ -49,7 +50,8 @@ def export_c(
     path : str or PathLike
         The file to write; whatever has this name is replaced, when the text is complete.
     precision : {"double", "float"}, optional
-        "float" is for controllers without double precision in hardware.
+        "float" is for controllers without double precision in hardware. Rods of a pair that differ by less than 1e-6
+        of the characteristic length then count as equal; the file says which.
     parts : sequence of str, optional
         "ik" from poses to actuators, completed where the task leaves something open; "limits" every limit, with the
         number of the one exceeded most, and the clearance of a machine that has one: "ik" and "fk" then return the
@@ -108,7 +110,10 @@ def c_source(
         raise InvalidArgument("parts", repr(parts), "'ik' and 'limits' too, for 'nearest' is made of them")
     require_identifier(name)
     require_positive("hold_price", hold_price)
-    machine = Machine(mechanism, hold_price)
+    equal_rods: list[str] = []
+    if precision == "float":
+        mechanism, equal_rods = with_equal_rods(mechanism)
+    machine = Machine(mechanism, hold_price, equal_rods)
     if parts is None:
         parts = parts_of(machine)
     if "nearest" in parts and machine.why_no_nearest:

@@ -108,15 +108,16 @@ class Machine:
     n_redundant, has_implicit_joints : the number of redundant joints, and if some of them are implicit.
     equations : the number of equations of the legs.
     hold_price : as of `Options`.
+    equal_rods : names of rods that were made equal to the other of their pair.
     """
 
-    def __init__(self, mechanism: Mechanism, hold_price: float = USUAL.hold_price) -> None:
-        self.hold_price = hold_price
+    def __init__(
+        self, mechanism: Mechanism, hold_price: float = USUAL.hold_price, equal_rods: Sequence[str] = ()
+    ) -> None:
+        self.hold_price, self.equal_rods = hold_price, equal_rods
         model = model_of(mechanism)
         if model.why_poses_do_not_suffice:
-            raise UnsupportedMechanism(
-                mechanism.name, [f"no legs in closed form, {model.why_poses_do_not_suffice}"], "exported"
-            )
+            raise UnsupportedMechanism(mechanism.name, [model.why_poses_do_not_suffice], "exported")
         table = model.legs
         self.mechanism, self.limits, self.cones = mechanism, table.limits, table.cones
         task = table.task[0]

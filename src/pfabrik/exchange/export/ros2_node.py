@@ -98,7 +98,7 @@ def commands(mechanism: Mechanism, folder: Path, name: str | None = None) -> lis
     target = quote(_example_target(mechanism, metres_of(mechanism.length_unit)))
     return [
         f"colcon build --packages-select {name}_node && source install/setup.bash",
-        f"ros2 launch {name}_node {name}.launch.py",
+        f"ros2 launch {name}_node {name}.launch.py open_loop:=true",
         f"ros2 topic pub --once /{name}/target geometry_msgs/msg/PoseStamped {target}",
     ]
 
@@ -116,14 +116,14 @@ def _words(machine: Machine, description: PlatformDescription, parts: list[Part]
     nearest = f"{name}_ik_or_nearest(&wanted, &pose, actuators, settings_.steps, settings_.starts, holding)"
     too_near = f" || code > {name.upper()}_PAIR" if "CLEARANCE" in has else ""
     actuators = [
-        [_exact(actuator), literal(metres if each.is_length else 1.0), literal(each.home)]
+        [_exact(actuator), _truth(each.is_length), *map(literal, (*_units(each.is_length, metres, size), each.home))]
         for actuator, each in zip(mechanism.actuator_names, machine.driven, strict=True)
     ]
     limits = []
     for (joint, bound), (value, is_length) in zip(machine.limits, machine.bounds, strict=True):
-        unit, shown = (metres, "m") if is_length else (1.0, "rad")
-        text = quoted(f"{joint} {bound} {value * unit:.10g} {shown}")
-        limits.append([text, literal(unit), literal(size if is_length else 1.0)])
+        unit, whole = _units(is_length, metres, size)
+        text = quoted(f"{joint} {bound} {value * unit:.10g} {'m' if is_length else 'rad'}")
+        limits.append([text, literal(unit), literal(whole)])
     listed = ", ".join(mechanism.actuator_names)
     columns = [drive.column for drive in mechanism.drives]
     return {
@@ -141,6 +141,7 @@ def _words(machine: Machine, description: PlatformDescription, parts: list[Part]
         "PLATFORM": _exact(mechanism.end_effector),
         "COMMANDS": "\n".join(f"    {each}" for each in commands(mechanism, Path(), name)),
         "METRES": literal(metres),
+        "SIZE": f"{size:.6g}",
         "AXES": ", ".join(_truth(axis) for axis in machine.axes),
         "ROTATIONS": str(machine.rotations),
         "HAS_NEAREST": _truth("nearest" in parts),
@@ -165,6 +166,11 @@ def _words(machine: Machine, description: PlatformDescription, parts: list[Part]
 def _exact(text: str) -> str:
     """A string of C++, and of YAML, that other programs compare with."""
     return json.dumps(text, ensure_ascii=False)
+
+
+def _units(is_length: bool, metres: float, size: float) -> tuple[float, float]:
+    """The unit of a coordinate, and what it counts in of all machines."""
+    return (metres, size) if is_length else (1.0, 1.0)
 
 
 def _truth(value: object) -> str:

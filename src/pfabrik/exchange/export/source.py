@@ -14,7 +14,7 @@ from ...common.arrays import Floats, Mask
 from ...configuration import configuration
 from ...feasibility import feasibility
 from ...ik import solve_ik
-from ...kinematics import JointPath, generic_of
+from ...kinematics import JointPath, engine_of, generic_of
 from ...machine.description.mechanism import Mechanism
 from ...machine.poses import pose
 from ...options import Options
@@ -30,7 +30,10 @@ FARTHEST = (0.3, 0.5)
 """The largest distance of these poses from home [L, rad]."""
 
 N_TRIED = 400
-KEEP = Options(working_mode="keep")
+MOST_STEPS = 40
+"""Most steps of the library's searches: answers that it reaches count, and of nearest poses that they are feasible; the
+search for the nearest of all takes a hundred times as long."""
+
 AGREEMENT: dict[Precision, float] = {"double": 1e-10, "float": 1e-4}
 """Tolerance to which actuators must agree [L or rad]: rounding may leave as much near a dead point."""
 
@@ -79,14 +82,19 @@ def _reached_around_home(mechanism: Mechanism) -> tuple[Floats, Solution]:
 
     Of a mechanism with fewer freedoms than its task sets, which reaches home alone of these, the nearest poses.
     """
-    targets = targets_around_home(mechanism, N_TRIED, np.random.default_rng(0))
+    asked, targets = _options(mechanism), targets_around_home(mechanism, N_TRIED, np.random.default_rng(0))
     targets[0] = mechanism.home_pose
     within = targets[~(np.asarray(feasibility(mechanism, targets).margin) < 0.0)]
-    solution = solve_ik(mechanism, within, options=KEEP)
+    solution = solve_ik(mechanism, within, options=asked)
     if np.any(np.ravel(solution.status)[1:] == 0):
         return within, solution
-    nearest = np.ascontiguousarray(solve_ik(mechanism, targets, options=KEEP).pose)
-    return nearest, solve_ik(mechanism, nearest, options=KEEP)
+    nearest = np.ascontiguousarray(solve_ik(mechanism, targets, options=asked).pose)
+    return nearest, solve_ik(mechanism, nearest, options=asked)
+
+
+def _options(mechanism: Mechanism) -> Options:
+    """What is asked of the library, in home's mode; some of its engines do not count steps."""
+    return Options(working_mode="keep", most_steps=MOST_STEPS if engine_of(mechanism).bounds_steps else None)
 
 
 def _distances(solution: Solution) -> Floats:
@@ -109,7 +117,7 @@ def _are_unique(machine: Machine, targets: Floats, solution: Solution, is_inside
         starts += list(solution.q[rows])
     is_same = np.ones(len(targets), dtype=bool)
     for start in starts:
-        other = solve_ik(mechanism, targets, start=start, options=KEEP)
+        other = solve_ik(mechanism, targets, start=start, options=_options(mechanism))
         is_same &= (other.status != 0) | (
             machine.largest_difference(other.actuators, solution.actuators) <= AGREEMENT["double"]
         )
@@ -326,6 +334,8 @@ def _header(machine: Machine, made: Translated, parts: Sequence[str], path: Join
     if "bodies" in parts:
         lines += ["", "body      name"]
         lines += [f"{place:<9} {name}" for place, name in enumerate(machine.bodies.names)]
+    if machine.equal_rods:
+        lines += ["", f"Rods that count as equal to the other of their pair: {', '.join(machine.equal_rods)}."]
     lines += ["", "leg       joints"]
     lines += [f"{place:<9} {', '.join(leg.joints)}" for place, leg in enumerate(machine.legs, 1)]
     body = [f"   {comment(line)}".rstrip() for line in [*lines, "", *NOTICE.splitlines()]]

@@ -45,6 +45,10 @@ from .path_kinematics import (
 ALIGNED = 1e-9
 """Sine below which two directions have no axis across them."""
 
+BY_DIFFERENCE = True
+"""True: the rotation's share of a squared distance is what that of the position leaves of it. In single precision,
+where such a rest has no digits below 1e-4 rad, it is False, and the share is summed."""
+
 
 PRICING = np.dtype(
     [
@@ -78,7 +82,7 @@ def pose_gradient(
 ) -> tuple[float, int]:
     """The objective, and the number of held components; without `turns` the rotation counts as that of the target."""
     w, force, unit = gradient.turn, gradient.force, gradient.unit[0]
-    value, held, w[3], w[4], w[5] = 0.0, 0, 0.0, 0.0, 0.0
+    value, of_turn, held, w[3], w[4], w[5] = 0.0, 0.0, 0, 0.0, 0.0, 0.0
     if turns and objective.frame == BASE_AXES:
         difference(X, target, w[3:])
     for i in range(6):
@@ -90,35 +94,45 @@ def pose_gradient(
         if objective.platform[i] == LOCKED:
             held = hold(gradient, held, i, w[i])
         else:
-            value += 0.5 * unit * objective.platform[i] * w[i] * w[i]
+            share = 0.5 * unit * objective.platform[i] * w[i] * w[i]
+            value += share
+            of_turn += share if i >= 3 else 0.0
             force[i] = unit * objective.platform[i] * w[i]
     if objective.frame == TARGET_AXES and objective.platform[3] == LOCKED:
         held = hold_tilt(target, X, gradient, held)
     elif objective.frame == TARGET_AXES and objective.platform[3] > 0.0:
-        value += tilt(target, unit * objective.platform[3], X, force)
+        of_turn = tilt(target, unit * objective.platform[3], X, force)
+        value += of_turn
     elif objective.frame == HALF_WAY and objective.platform[5] == LOCKED:
         held = hold(gradient, held, 5, yaw_difference(X, target))
         for i in range(3):
             gradient.holds[held - 1, 3 + i] = yaw_gradient(X, i)
     elif objective.frame == HALF_WAY and objective.platform[5] > 0.0:
         off, weight = yaw_difference(X, target), unit * objective.platform[5]
-        value += 0.5 * weight * off * off
+        of_turn = 0.5 * weight * off * off
+        value += of_turn
         for i in range(3):
             force[3 + i] += weight * off * yaw_gradient(X, i)
     if objective.price > 0.0:
-        value = add_price(objective, value, gradient)
+        value = add_price(objective, value, of_turn, gradient)
     return value, held
 
 
 @routine
-def add_price(objective: PoseObjective, value: float, gradient: PoseGradient) -> float:
-    """Half the squared priced distance, its gradient in `force`, from half the squared distance and its gradient."""
+def add_price(objective: PoseObjective, value: float, of_turn: float, gradient: PoseGradient) -> float:
+    """Half the squared priced distance, its gradient in `force`, from half the squared distance and its gradient.
+
+    Parameters
+    ----------
+    of_turn : the rotation's share of half the squared distance.
+    """
     force, off, pricing, unit, place = gradient.force, gradient.turn, gradient.pricing[0], gradient.unit[0], 0.0
     for i in range(3):
         place += 0.5 * objective.platform[i] * off[i] * off[i] if objective.platform[i] != LOCKED else 0.0
     F = 0.0
     if pricing["is_fixed"] == 0:
-        pricing["place"], pricing["turn"] = place, max(value / unit - place, 0.0)
+        pricing["place"] = place
+        pricing["turn"] = max(value / unit - place, 0.0) if BY_DIFFERENCE else of_turn / unit
         pricing["by_place"], pricing["by_turn"] = 1.0, 1.0
         if value > 0.0:
             F, by_place, by_turn, _, _, _, _ = price(objective, pricing["place"], pricing["turn"])

@@ -35,6 +35,7 @@ from .leg_forms import (
     KeptAxis,
     LegForm,
     NoLeg,
+    NoRod,
     Pivot,
     RedundantJoint,
     Rod,
@@ -86,8 +87,12 @@ def _branched(home: HomeNumbers, chain: SubChain) -> tuple[LegForm, ...]:
         return _on_redundant(trunk, (first_branch, *other_branches), is_reversed=False)
     if len(trunk) != 1:
         raise NoLeg("several joints carry its branches")
-    first_rod = _rod(trunk[0], first_branch, is_reversed=False)
-    rods = [_rod(None, branch, is_reversed=False) for branch in other_branches]
+    try:
+        first_rod = _rod(trunk[0], first_branch, is_reversed=False)
+        rods = [_rod(None, branch, is_reversed=False) for branch in other_branches]
+    except NoRod as reason:
+        name = trunk[0].joint.name
+        raise NoLeg(f"{reason}; with the body that joint {name} carries as the base closed forms may answer") from None
     if _are_alike((first_rod, *rods)):
         return (first_rod, *(replace(rod, is_shared=True) for rod in rods))
     redundant_joint = RedundantJoint(trunk[0], is_reversed=False)
@@ -324,7 +329,7 @@ def _rod(proximal: ElementaryJoint | None, elements: list[ElementaryJoint], is_r
     if proximal is not None and proximal.kind == "S":
         raise NoLeg("a ball joint carries the rod")
     sizes = range(MOST_HINGES, 0, -1)
-    reason = "its joints do not meet in two points"
+    reason = NoLeg("its joints do not meet in two points")
     for n_base, n_platform in sorted(product(sizes, sizes), key=sum, reverse=True):
         if n_base + n_platform > len(elements):
             continue
@@ -336,8 +341,8 @@ def _rod(proximal: ElementaryJoint | None, elements: list[ElementaryJoint], is_r
                 proximal, base_end, elements[n_base : len(elements) - n_platform], platform_end, is_reversed
             )
         except NoLeg as error:
-            reason = str(error)
-    raise NoLeg(reason)
+            reason = error
+    raise reason
 
 
 def _ending(elements: Sequence[ElementaryJoint]) -> Ending | None:
@@ -375,10 +380,12 @@ def _checked_rod(
     start, end = _ends(base_end, platform_end)
     length = norm(end - start)
     if length <= TOLERANCES.alignment:
-        raise NoLeg("a rod of no length")
+        names = dict.fromkeys(element.joint.name for element in (*base_end.elements, *platform_end.elements))
+        raise NoRod(f"joints {', '.join(names)} meet in one point, where a rod should be")
     line = (end - start) / length
-    if any(element.kind == "S" or area(element.axis, line) > TOLERANCES.implied for element in middle):
-        raise NoLeg("a joint between the ends of its rod that is not along it")
+    for element in middle:
+        if element.kind == "S" or area(element.axis, line) > TOLERANCES.implied:
+            raise NoLeg(f"joint {element.joint.name}, between the ends of its rod, is not along it")
     slides, twists = ([_along(element, line) for element in middle if element.kind == kind] for kind in "PR")
     if len(slides) > 1 or len(twists) > 1:
         raise NoLeg("several joints along its rod")

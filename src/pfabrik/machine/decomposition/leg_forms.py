@@ -22,6 +22,10 @@ class NoLeg(Exception):
     """The chain is no leg with closed forms; the text says why."""
 
 
+class NoRod(NoLeg):
+    """Its two ends are in one point."""
+
+
 @dataclass(frozen=True, eq=False)
 class ElementaryJoint:
     """A hinge (R), slide (P) or ball (S) on a path from the base outward; lengths in L; numbers are on a tape.

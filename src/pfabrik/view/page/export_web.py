@@ -127,6 +127,7 @@ def machine_data(model: Model, options: Options = USUAL) -> dict[str, Any]:
             "only": None if only is None else only.tolist(),
         },
         "actuators": [_actuator(drive) for drive in mechanism.drives],
+        "arms": legs.implicit_joints["leg"].tolist() if legs.has_free_redundant else [],
         "others": len(tables.others.poses),
         "limits": _limits(model),
         "ranges": [

@@ -25,7 +25,8 @@ struct World
   std::map<std::string, std::any> parameters, callbacks, messages;
   std::map<std::string, std::size_t> published;
   std::vector<std::function<void()>> timers;
-  std::set<std::string> settable;  // parameters that `ros2 param set` changes
+  std::set<std::string> settable, unsaid;  // parameters that `ros2 param set` changes, and without a description
+  double seconds = 0.0;
 };
 inline World & world()
 {
@@ -44,10 +45,40 @@ public:
   SensorDataQoS() : QoS(5) {}
 };
 
+class SystemDefaultsQoS : public QoS
+{
+public:
+  SystemDefaultsQoS() : QoS(0) {}
+};
+
+class Duration
+{
+public:
+  explicit Duration(double seconds) : seconds_(seconds) {}
+  double seconds() const { return seconds_; }
+
+private:
+  double seconds_;
+};
+
 class Time
 {
 public:
+  explicit Time(double seconds = 0.0) : seconds_(seconds) {}
   operator builtin_interfaces::msg::Time() const { return {7, 0}; }
+  Duration operator-(const Time & other) const { return Duration(seconds_ - other.seconds_); }
+
+private:
+  double seconds_;
+};
+
+struct QosOverridingOptions
+{
+  static QosOverridingOptions with_default_policies() { return {}; }
+};
+struct SubscriptionOptions
+{
+  QosOverridingOptions qos_overriding_options;
 };
 
 template <typename M>
@@ -84,7 +115,7 @@ class Node
 public:
   explicit Node(const std::string & name) : name_(name) {}
   const char * get_name() const { return name_.c_str(); }
-  Time now() const { return {}; }
+  Time now() const { return Time(world().seconds); }
 
   template <typename T>
   T declare_parameter(
@@ -92,6 +123,9 @@ public:
   {
     if (!descriptor.read_only) {
       world().settable.insert(name);
+    }
+    if (descriptor.description.empty()) {
+      world().unsaid.insert(name);
     }
     const auto at = world().parameters.find(name);
     return at == world().parameters.end() ? usual : std::any_cast<T>(at->second);
@@ -104,8 +138,10 @@ public:
   }
 
   template <typename M, typename C>
-  typename Subscription<M>::SharedPtr create_subscription(const std::string & topic, const QoS &, C && callback)
+  typename Subscription<M>::SharedPtr create_subscription(
+    const std::string & topic, const QoS &, C && callback, const SubscriptionOptions & options = {})
   {
+    static_cast<void>(options);
     world().callbacks[topic] = std::function<void(const M &)>(callback);
     return std::make_shared<Subscription<M>>();
   }

@@ -32,11 +32,15 @@ class Node : public rclcpp::Node
 public:
   Node() : rclcpp::Node("@NAME@"), platform_(settings())
   {
-    base_frame_ = parameter<std::string>("base_frame", @BASE@);
-    platform_frame_ = parameter<std::string>("platform_frame", @PLATFORM@);
-    const auto command = choice("command", "array", {"array", "joint_state"});
-    show_ = choice("show", "achieved", {"achieved", "measured", "nothing"});
-    const double rate = number("show_rate", 30.0, 0.001, 1000.0);
+    base_frame_ = parameter<std::string>("base_frame", @BASE@, "frame of targets, poses and the transform");
+    platform_frame_ = parameter<std::string>("platform_frame", @PLATFORM@, "frame that the transform places");
+    open_loop_ = parameter("open_loop", false, "begin from home and refuse no target for want of measured actuators");
+    states_timeout_ = number(
+      "states_timeout", 0.5, 0.0, 1e6, "age of a measured actuator from which on targets are refused [s]; 0.0: none is");
+    const auto command = choice("command", "array", {"array", "joint_state"}, "type of ~/joint_command");
+    show_ = choice("show", "achieved", {"achieved", "measured", "nothing"}, "what ~/joint_states and /tf show");
+    const double rate = number("show_rate", 30.0, 0.001, 1000.0, "how often they are published [Hz]");
+    const double every = number("diagnostic_updater.period", 1.0, 0.001, 1e6, "time from one report to the next [s]");
     if (show_ == "measured" && !kHasForward) {
       throw std::invalid_argument("show: this machine's actuators do not determine its pose; expected achieved or nothing");
     }
@@ -55,44 +59,63 @@ public:
     transforms_.transforms[0].header.frame_id = base_frame_;
     transforms_.transforms[0].child_frame_id = platform_frame_;
 
-    const rclcpp::QoS latest(1);
+    const rclcpp::SystemDefaultsQoS usual;  // as controllers of ros2_control have it
     if (command == "array") {
-      command_publisher_ = create_publisher<std_msgs::msg::Float64MultiArray>("~/joint_command", latest);
+      command_publisher_ = create_publisher<std_msgs::msg::Float64MultiArray>("~/joint_command", usual);
     } else {
-      command_state_publisher_ = create_publisher<JointState>("~/joint_command", latest);
+      command_state_publisher_ = create_publisher<JointState>("~/joint_command", usual);
     }
-    achieved_publisher_ = create_publisher<PoseStamped>("~/achieved", latest);
-    diagnostics_publisher_ = create_publisher<diagnostic_msgs::msg::DiagnosticArray>("/diagnostics", 10);
+    achieved_publisher_ = create_publisher<PoseStamped>("~/achieved", usual);
+    diagnostics_publisher_ = create_publisher<diagnostic_msgs::msg::DiagnosticArray>("/diagnostics", 1);
     target_subscription_ = create_subscription<PoseStamped>(
-      "~/target", latest, [this](const PoseStamped & target) { on_target(target); });
+      "~/target", usual, [this](const PoseStamped & target) { on_target(target); });
     if (kHasForward) {
-      measured_publisher_ = create_publisher<PoseStamped>("~/pose", latest);
-      actuator_subscription_ = create_subscription<JointState>(
-        "~/actuator_states", rclcpp::SensorDataQoS(), [this](const JointState & state) { on_actuators(state); });
+      measured_publisher_ = create_publisher<PoseStamped>("~/pose", usual);
     }
+    rclcpp::SubscriptionOptions options;  // as robot_state_publisher has them
+    options.qos_overriding_options = rclcpp::QosOverridingOptions::with_default_policies();
+    actuator_subscription_ = create_subscription<JointState>(
+      "~/actuator_states", rclcpp::SensorDataQoS(), [this](const JointState & state) { on_actuators(state); }, options);
     if (show_ != "nothing") {
-      joint_publisher_ = create_publisher<JointState>("~/joint_states", 10);
-      transform_publisher_ = create_publisher<tf2_msgs::msg::TFMessage>("/tf", 100);
-      const std::chrono::nanoseconds period(static_cast<std::int64_t>(1e9 / rate));
-      show_timer_ = create_wall_timer(period, [this]() { show(); });
+      joint_publisher_ = create_publisher<JointState>("~/joint_states", usual);
+      transform_publisher_ = create_publisher<tf2_msgs::msg::TFMessage>("/tf", usual);
+      show_timer_ = create_wall_timer(nanoseconds(1.0 / rate), [this]() { show(); });
     }
-    report_timer_ = create_wall_timer(std::chrono::seconds(1), [this]() { report(); });
+    report_timer_ = create_wall_timer(nanoseconds(every), [this]() { report(); });
   }
 
 private:
+  using Descriptor = rcl_interfaces::msg::ParameterDescriptor;
+
   // A parameter that is read now and never again: setting it later is refused.
   template <typename T>
-  T parameter(const char * name, const T & usual)
+  T parameter(const char * name, const T & usual, const std::string & what, Descriptor descriptor = Descriptor())
   {
-    rcl_interfaces::msg::ParameterDescriptor descriptor;
+    descriptor.description = what;
     descriptor.read_only = true;
     return declare_parameter<T>(name, usual, descriptor);
   }
 
-  template <typename T>
-  T number(const char * name, T usual, T least, T most)
+  static void put_range(Descriptor & descriptor, double least, double most)
   {
-    const T value = parameter<T>(name, usual);
+    descriptor.floating_point_range.resize(1);
+    descriptor.floating_point_range[0].from_value = least;
+    descriptor.floating_point_range[0].to_value = most;
+  }
+
+  static void put_range(Descriptor & descriptor, std::int64_t least, std::int64_t most)
+  {
+    descriptor.integer_range.resize(1);
+    descriptor.integer_range[0].from_value = least;
+    descriptor.integer_range[0].to_value = most;
+  }
+
+  template <typename T>
+  T number(const char * name, T usual, T least, T most, const char * what)
+  {
+    Descriptor descriptor;
+    put_range(descriptor, least, most);
+    const T value = parameter<T>(name, usual, what, descriptor);
     if (!(value >= least && value <= most)) {  // nor NaN
       const auto expected = text(least) + " to " + text(most);
       throw std::invalid_argument(std::string(name) + ": found " + text(value) + "; expected " + expected);
@@ -100,15 +123,16 @@ private:
     return value;
   }
 
-  std::string choice(const char * name, const char * usual, const std::vector<std::string> & choices)
+  std::string choice(
+    const char * name, const char * usual, const std::vector<std::string> & choices, const std::string & what)
   {
-    const auto value = parameter<std::string>(name, usual);
     std::string expected;
     for (const auto & each : choices) {
-      if (value == each) {
-        return value;
-      }
       expected += (expected.empty() ? "" : ", ") + each;
+    }
+    const auto value = parameter<std::string>(name, usual, what + ": one of " + expected);
+    if (std::find(choices.begin(), choices.end(), value) != choices.end()) {
+      return value;
     }
     throw std::invalid_argument(std::string(name) + ": found '" + value + "'; expected one of " + expected);
   }
@@ -117,29 +141,37 @@ private:
   {
     Settings settings;
     const char * usual = kHasNearest ? "project" : "hold";
-    settings.projects = choice("out_of_reach", usual, {"project", "hold"}) == "project";
+    settings.projects =
+      choice("out_of_reach", usual, {"project", "hold"}, "what a target out of reach commands") == "project";
     if (settings.projects && !kHasNearest) {
       throw std::invalid_argument("out_of_reach: no nearest pose is found for this machine; expected hold");
     }
-    settings.steps = static_cast<int>(number<std::int64_t>("steps", settings.steps, 1, 10000));
-    settings.starts = static_cast<int>(number<std::int64_t>("starts", settings.starts, 0, 10000));
-    settings.largest_step = number("largest_step", settings.largest_step, 0.0, 1e6);
+    settings.steps =
+      static_cast<int>(number<std::int64_t>("steps", settings.steps, 1, 10000, "most steps of a search out of reach"));
+    settings.starts = static_cast<int>(
+      number<std::int64_t>("starts", settings.starts, 0, 10000, "from how many more places the search begins"));
+    settings.largest_step = number(
+      "largest_step", settings.largest_step, 0.0, 1e6,
+      "a target for which an actuator moves farther from one command to the next is refused [L or rad]; 0.0: none is");
     return settings;
+  }
+
+  static std::chrono::nanoseconds nanoseconds(double seconds)
+  {
+    return std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * seconds));
   }
 
   void on_target(const PoseStamped & target)
   {
     const auto & at = target.pose.position;
     const auto & q = target.pose.orientation;
-    is_in_frame_ = target.header.frame_id == base_frame_;
-    if (!is_in_frame_) {
-      frame_ = target.header.frame_id;
-    }
     const Status before = platform_.status();
+    refusal_ = refusal(target);
     const Status status =
-      is_in_frame_ ? platform_.target({{at.x, at.y, at.z}, {q.x, q.y, q.z, q.w}}) : platform_.refuse();
+      refusal_.empty() ? platform_.target({{at.x, at.y, at.z}, {q.x, q.y, q.z, q.w}}) : platform_.refuse();
     ++counts_[static_cast<std::size_t>(status)];
     if (status == Status::kReached || status == Status::kProjected) {
+      is_begun_ = true;
       const auto & actuators = platform_.commanded().actuators;
       if (command_publisher_) {
         std::copy(actuators.begin(), actuators.end(), command_.data.begin());
@@ -158,9 +190,27 @@ private:
     }
   }
 
-  // Names in any order, others among them. Several may publish, each a part: the rest is as it was last heard.
+  // Why a target is refused whatever it is; empty: it is not. Where the machine stands must be known, and once states
+  // have stopped it begins anew from where it was measured.
+  std::string refusal(const PoseStamped & target)
+  {
+    if (target.header.frame_id != base_frame_) {
+      return "found frame '" + target.header.frame_id + "'; expected '" + base_frame_ + "'";
+    }
+    if (open_loop_) {
+      return "";
+    }
+    is_begun_ = is_begun_ && stopped() == kActuators;
+    return is_begun_ || (is_measured_ && stopped() == kActuators) ? "" : of_actuators().message;
+  }
+
+  // Names in any order, others among them. Several may publish, each a part: the rest is as it was last heard. Until
+  // the first command, what is commanded is where the machine was measured.
   void on_actuators(const JointState & state)
   {
+    const bool has_stopped = missing() == kActuators && stopped() < kActuators;
+    is_begun_ = is_begun_ && !has_stopped;
+    is_measured_ = is_measured_ && !has_stopped;
     is_heard_ = true;
     bool has_any = false;
     for (std::size_t i = 0; i < kActuators; ++i) {
@@ -170,14 +220,22 @@ private:
       }
       if (k < state.name.size() && k < state.position.size()) {
         heard_[i] = state.position[k];
+        heard_at_[i] = now();
         has_any = true;
       }
     }
-    if (!has_any || missing() < kActuators) {
+    if (!has_any || stopped() < kActuators) {
       return;
     }
     const int code = measured_code_ = platform_.measure(heard_);
-    if (@IS_MEASURED@) {
+    is_measured_ = @IS_MEASURED@;
+    if (!is_measured_) {
+      return;
+    }
+    if (!open_loop_ && !is_begun_) {
+      platform_.begin();
+    }
+    if (kHasForward) {
       put(platform_.measured().pose, measured_.pose);
       measured_.header.stamp = state.header.stamp;
       measured_publisher_->publish(measured_);
@@ -189,6 +247,19 @@ private:
   {
     const auto at = std::find_if(heard_.begin(), heard_.end(), [](double value) { return std::isnan(value); });
     return static_cast<std::size_t>(at - heard_.begin());
+  }
+
+  // How long an actuator has not been heard [s].
+  double age(std::size_t actuator) const { return (now() - heard_at_[actuator]).seconds(); }
+
+  // The first actuator that was not heard, or not within states_timeout; kActuators: none.
+  std::size_t stopped() const
+  {
+    std::size_t at = missing();
+    for (std::size_t i = 0; i < kActuators && at == kActuators && states_timeout_ > 0.0; ++i) {
+      at = age(i) > states_timeout_ ? i : at;
+    }
+    return at;
   }
 
   // Joint states and the transform of what is shown: home until the first target, or measurement.
@@ -225,7 +296,8 @@ private:
     diagnostic_msgs::msg::DiagnosticArray array;
     array.header.stamp = now();
     array.status.push_back(of_target());
-    if (is_heard_) {
+    array.status.push_back(of_limits());
+    if (is_heard_ || !open_loop_) {
       array.status.push_back(of_actuators());
     }
     diagnostics_publisher_->publish(array);
@@ -237,14 +309,28 @@ private:
     DiagnosticStatus status = named("target", word(is));
     const bool is_well = is == Status::kWaiting || is == Status::kReached;
     status.level = is == Status::kRefused ? DiagnosticStatus::ERROR : is_well ? DiagnosticStatus::OK : DiagnosticStatus::WARN;
-    if (is == Status::kRefused && !is_in_frame_) {
-      status.message += ": found frame '" + frame_ + "'; expected '" + base_frame_ + "'";
-    } else if (!is_well) {
-      status.message += std::string(": ") + platform_.reason();
+    if (!is_well) {
+      status.message += ": " + (refusal_.empty() ? platform_.reason() : refusal_);
     }
-    if (platform_.jump() < kActuators) {
-      status.message += std::string(": ") + kActuatorTable[platform_.jump()].name;
+    const std::size_t jump = platform_.jump();
+    if (jump < kActuators) {
+      const char * unit = kActuatorTable[jump].is_length ? " m" : " rad";
+      status.message += std::string(": ") + kActuatorTable[jump].name + " by " + text(platform_.jump_size()) + unit;
+      status.message += "; largest_step allows " + text(platform_.largest_step(jump)) + unit;
     }
+    add(status, "jumped", platform_.has_jumped() ? "true" : "false");
+    add(status, "distance from target [m]", text(platform_.distance()));
+    add(status, "rotation from target [rad]", text(platform_.angle()));
+    for (const Status each : {Status::kReached, Status::kProjected, Status::kHeld, Status::kRefused}) {
+      add(status, word(each), std::to_string(counts_[static_cast<std::size_t>(each)]));
+    }
+    return status;
+  }
+
+  // Of what is commanded: the limits that are active, and the room before each by its name [m or rad].
+  DiagnosticStatus of_limits() const
+  {
+    DiagnosticStatus status = named("limits", "");
     std::string active;
     for (std::size_t i = 0; i < kLimits; ++i) {
       if (platform_.is_active(i)) {
@@ -259,21 +345,20 @@ private:
     if (platform_.pair() != 0) {
       std::string words(@NAME@_what(@PAIR@));
       words.erase(0, words.find(": ") + 2);
+      words.replace(words.find(" and "), 5, "–");
       add(status, "nearest links", words);
       add(status, "between them [m]", text(platform_.between_links()));
       if (platform_.between_links() <= kClearance + kRounding) {
-        active += (active.empty() ? "" : "; ") + words + " min " + text(kClearance) + " m";
+        active += (active.empty() ? "" : "; ") + words + " clearance " + text(kClearance) + " m";
       }
     }
-    add(status, "active limits", active);
-    add(status, "jumped", platform_.has_jumped() ? "true" : "false");
-    add(status, "distance from target [m]", text(platform_.distance()));
-    add(status, "rotation from target [rad]", text(platform_.angle()));
+    status.level = active.empty() ? DiagnosticStatus::OK : DiagnosticStatus::WARN;
+    status.message = active.empty() ? "none is active" : active;
     const std::size_t nearest = platform_.nearest_limit();
     add(status, "nearest limit", nearest < kLimits ? kLimitTable[nearest].name : "");
     add(status, "margin [m or rad]", nearest < kLimits ? text(platform_.room(nearest)) : "");
-    for (const Status each : {Status::kReached, Status::kProjected, Status::kHeld, Status::kRefused}) {
-      add(status, word(each), std::to_string(counts_[static_cast<std::size_t>(each)]));
+    for (std::size_t i = 0; i < kLimits; ++i) {
+      add(status, kLimitTable[i].name, text(platform_.room(i)));
     }
     return status;
   }
@@ -285,6 +370,9 @@ private:
     if (missing() < kActuators) {
       status.level = DiagnosticStatus::ERROR;
       status.message = std::string("no position of ") + kActuatorTable[missing()].name;
+    } else if (stopped() < kActuators) {
+      status.level = DiagnosticStatus::STALE;
+      status.message = "no position of " + std::string(kActuatorTable[stopped()].name) + " for " + text(age(stopped())) + " s";
     } else if (measured_code_ != 0) {
       status.level = DiagnosticStatus::WARN;
       status.message = @NAME@_what(measured_code_);
@@ -319,9 +407,12 @@ private:
   }
 
   Platform platform_;
-  std::string base_frame_, platform_frame_, show_, frame_;
-  bool is_in_frame_ = true, is_heard_ = false;
+  std::string base_frame_, platform_frame_, show_, refusal_;
+  // Whether an actuator was heard, all of them were and the pose there is known, and a command followed from there.
+  bool is_heard_ = false, is_measured_ = false, is_begun_ = false, open_loop_ = false;
+  double states_timeout_ = 0.0;
   std::array<double, kActuators> heard_;
+  std::array<rclcpp::Time, kActuators> heard_at_;
   int measured_code_ = 0;
   std::array<std::size_t, 5> counts_{};
   std_msgs::msg::Float64MultiArray command_;

@@ -28,11 +28,13 @@ constexpr bool kHasNearest = @HAS_NEAREST@, kHasForward = @HAS_FORWARD@;
 constexpr bool kAxes[3] = {@AXES@};  // that the task sets
 constexpr int kRotations = @ROTATIONS@;  // 3: the rotation is set, 2: the direction of z, 1: the yaw, 0: nothing
 
-// An actuator: its unit is kMetres of a length, or 1; home in the machine's unit.
+// An actuator: a length, whose unit is kMetres and whose size the characteristic length [m], or an angle, both 1; home
+// in its unit.
 struct Actuator
 {
   const char * name;
-  double unit, home;
+  bool is_length;
+  double unit, size, home;
 };
 constexpr Actuator kActuatorTable[] = {
 @ACTUATOR_TABLE@};
@@ -78,7 +80,9 @@ struct Settings
 {
   bool projects = true;  // out of reach: to the nearest feasible pose, else the last command stays
   int steps = 100, starts = 0;  // of the search for it
-  double largest_step = 0.0;  // an actuator that would move farther in one step refuses the target [m or rad]; 0: none
+  // An actuator that would move farther from one command to the next refuses the target [characteristic lengths, or
+  // rad]; 0: none does.
+  double largest_step = 0.1;
 };
 
 // A configuration: the pose in the machine's unit, actuators and joints of the description in m and rad.
@@ -110,8 +114,10 @@ public:
   Status status() const { return status_; }
   // The reason in words, where the status is not kReached: out of reach it is what is in the way at the target.
   const char * reason() const { return jump_ < kActuators ? "a jump of an actuator" : @NAME@_what(code_); }
-  // The actuator that would have jumped; kActuators: none.
+  // The actuator that would have jumped, kActuators: none; how far, and how far it may move in one step [m or rad].
   std::size_t jump() const { return jump_; }
+  double jump_size() const { return jump_size_; }
+  double largest_step(std::size_t actuator) const { return settings_.largest_step * kActuatorTable[actuator].size; }
   // Whether the actuators jump to what is commanded: no motion of the mechanism leads there from the command before.
   bool has_jumped() const { return has_jumped_; }
   const Configuration & commanded() const { return commanded_; }
@@ -135,6 +141,14 @@ public:
     code_ = @MACRO@_NO_POSE;
     jump_ = kActuators;
     return status_ = Status::kRefused;
+  }
+
+  // Begin where the machine was measured: the next target is commanded from there.
+  void begin()
+  {
+    commanded_ = measured_;
+    holding_.fill(0);
+    put_limits();
   }
 
   // The pair of links that are nearest to each other, and their distance [m]; 0 of a machine without a clearance.
@@ -175,7 +189,8 @@ public:
     }
     @COUNT_TURNS@
     for (std::size_t i = 0; i < kActuators && settings_.largest_step > 0.0; ++i) {
-      if (std::fabs(actuators[i] * kActuatorTable[i].unit - commanded_.actuators[i]) > settings_.largest_step) {
+      jump_size_ = std::fabs(actuators[i] * kActuatorTable[i].unit - commanded_.actuators[i]);
+      if (jump_size_ > largest_step(i)) {
         jump_ = i;
         put_errors(wanted);
         return status_ = Status::kRefused;
@@ -190,9 +205,14 @@ public:
     return status_ = is_reached ? Status::kReached : Status::kProjected;
   }
 
-  // The pose at measured actuators, from the last measured one; 0, or a code of the kinematics.
+  // The pose at measured actuators, from the last measured one; 0, or a code of the kinematics. Where actuators do not
+  // determine a pose they alone are measured.
   int measure(const std::array<double, kActuators> & values)
   {
+    if (!kHasForward) {
+      measured_.actuators = values;
+      return 0;
+    }
     @NAME@_pose pose = measured_.pose;
     double actuators[kActuators];
     for (std::size_t i = 0; i < kActuators; ++i) {
@@ -362,7 +382,7 @@ private:
   bool has_jumped_ = false;
   std::size_t jump_ = kActuators, nearest_ = kLimits;
   Configuration commanded_{}, measured_{};
-  double distance_ = 0.0, angle_ = 0.0, between_ = 0.0;
+  double jump_size_ = 0.0, distance_ = 0.0, angle_ = 0.0, between_ = 0.0;
   std::array<char, kLimits + 1> holding_{};
   std::array<double, kLimits + 1> slack_{};
   std::array<@NAME@_pose, kBodies> bodies_{};

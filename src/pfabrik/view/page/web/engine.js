@@ -89,8 +89,18 @@ class Engine {
     if (found === PENDING) return this.failed(start ?? this.home);
     if (found === INVALID) return this.failed(start ?? this.home, INVALID);
     const answer = this.read(found === UNSURE ? PROJECTED : found);
-    if (answer.status === PROJECTED && !answer.proximal.some(Number.isNaN)) answer.limits = this.holding();
-    return this.complete(answer);
+    if (answer.status !== PROJECTED) return this.complete(answer);
+    if (!answer.proximal.some(Number.isNaN)) answer.limits = this.holding();
+    return this.complete(this.rested(answer, start ?? this.home));
+  }
+
+  /** A projection whose arms, if poses leave them open, are no farther from its start than its pose asks for. */
+  rested(answer, start) {
+    const { arms } = this.machine;
+    if (!arms.length || this.solve(answer.pose, start, { last: BY_LEGS }) !== REACHED) return answer;
+    const far = ({ branch }) => Math.hypot(...arms.map((k) => branch[k] - start.branch[k]));
+    const { branch, actuators, proximal } = this.read(REACHED);
+    return far({ branch }) < far(answer) ? { ...answer, branch, actuators, proximal } : answer;
   }
 
   /** True if no motion leads from a start to an answer as its target goes on: the way back does not undo the step. */
