@@ -27,13 +27,17 @@ class File:
         integer: str,
         facts: dict[tuple[str, str], set[int]] | None,
         tolerances: dict[tuple[str, str], float] | None,
+        fields: set[tuple[str, str]] | None = None,
+        shapes: dict[tuple[str, str], tuple[int, ...]] | None = None,
     ) -> None:
         self.real, self.integer, self.facts, self.tolerances = real, integer, facts or {}, tolerances or {}
         self.suffix = "f" if real == "float" else ""
         self.bits = int(re.sub(r"\D", "", integer))  # that an integer has at least
         self.records = named_records()
         self.items: dict[str, str] = {}  # C text by the name that it declares
-        self.spell = Spelling(self._declare)
+        self.shapes = shapes or {}
+        self.of_other_shapes: set[tuple[str, str]] = set()  # of these fields, where functions have made it otherwise
+        self.spell = Spelling(self._declare, fields, self.shapes)
         self._constants: dict[str, Any] = {}
         prelude = PRELUDE.read_text(encoding="utf-8").replace("REAL", real).replace("INTEGER", integer)
         if self.suffix:

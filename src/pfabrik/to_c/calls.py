@@ -10,7 +10,7 @@ import numpy as np
 
 from .expressions import ANNOTATED
 from .subscripts import Subscripts
-from .types import BOOL, INTEGER, NUMBERS, REAL, WIDE, Array, Struct, Tuple, element_of, join
+from .types import BOOL, INTEGER, NUMBERS, REAL, WIDE, Array, Struct, Tuple, Unreachable, element_of, join
 from .values import UNARY, Value, effects, is_simple, opened_by, source_of, tree_of
 
 MATH = frozenset(
@@ -59,10 +59,14 @@ class Calls(Subscripts):
             declared = ANNOTATED.get(ast.unparse(a.annotation) if a.annotation else "")
             given.append(self.cast(v, declared, node) if declared and v.type in NUMBERS else self.addressed(v))
         made = self.program.instance(called, tuple(v.type for v in given))
+        if made.is_unreachable:
+            raise Unreachable
         more = effects(given)
         self.reads |= made.reads
         self.writes |= made.writes
         self.allocates |= made.allocates
+        if made.is_constant and not more["writes"]:
+            return Value(self.program.literal(made.results[0], made.gives), made.gives, UNARY, made.results[0])
         texts = [*(["memory"] if made.allocates else []), *(self.as_view(v).text for v in given)]
         text = f"{made.name}({', '.join(texts)})"
         return Value(
@@ -83,9 +87,14 @@ class Calls(Subscripts):
         if any(v.type is None for v in values):
             return Value("0", None, **effects(values))
         pairs = zip(values, wants, strict=True)
-        values = [self.cast(v, w, node) if v.type in NUMBERS else self.as_view(v) for v, w in pairs]
-        t = Struct(cls, tuple(v.type for v in values))
-        text = f"({self.program.spell.value(t)}){{{', '.join(map(self.stored, values))}}}"
+        values = [self.cast(v, w, node) if v.type in NUMBERS else v for v, w in pairs]
+        t, given = Struct(cls, tuple(v.type for v in values)), []
+        for field in self.program.spell.members(cls):
+            v, shape = values[cls._fields.index(field)], self.program.shapes.get((cls.__name__, field))
+            if shape is not None and (v.inner is None or v.inner[1] != shape):
+                self.program.of_other_shapes.add((cls.__name__, field))
+            given.append(self.stored(v) if shape is None or v.inner is None else v.inner[0])
+        text = f"({self.program.spell.value(t)}){{{', '.join(given) or '0'}}}"
         return Value(text, t, is_held=True, **effects(values))
 
     def allocated(self, node: ast.Call, how: str) -> Value:

@@ -19,6 +19,10 @@ class Unsupported(Exception):
     """An unsupported construct, with its place in the source."""
 
 
+class Unreachable(Exception):
+    """Code that the facts do not let happen: it has an element of an array that has none."""
+
+
 @dataclass(frozen=True)
 class Record:
     """An element of a structured array, by address."""
@@ -104,8 +108,14 @@ def without_width(t: Any) -> Any:
 class Spelling:
     """The C types of a program, declared as they are needed."""
 
-    def __init__(self, declare: Any) -> None:
+    def __init__(
+        self,
+        declare: Any,
+        fields: set[tuple[str, str]] | None = None,
+        shapes: dict[tuple[str, str], tuple[int, ...]] | None = None,
+    ) -> None:
         self.declare = declare  # takes a name and its text
+        self.fields, self.shapes = fields, shapes or {}
         self.known: dict[Any, str] = {}
         self.taken: set[str] = set()
 
@@ -127,6 +137,17 @@ class Spelling:
         if t not in self.known:
             self.known[t] = self._define(t)
         return self.known[t]
+
+    def members(self, cls: Any) -> list[str]:
+        """The fields of a NamedTuple that its struct has."""
+        return [each for each in cls._fields if self.fields is None or (cls.__name__, each) in self.fields]
+
+    def pointer(self, t: Array) -> str:
+        """The C type of a pointer to an array of known shape, with a space where a name may follow."""
+        return f"{self.value(t.element)} *"
+
+    def _member(self, cls: Any, field: str, t: Any) -> str:
+        return self.pointer(t) if (cls.__name__, field) in self.shapes else self.stored(t)
 
     def _named(self, wanted: str) -> str:
         name, k = wanted, 2
@@ -156,7 +177,9 @@ class Spelling:
             name = self._named("_".join(["tuple", *shorts]))
             self.declare(name, f"typedef struct {{ {' '.join(fields)} }} {name};\n")
         else:
-            fields = [f"    {self.stored(item)}{c_name(f)};" for f, item in zip(t.cls._fields, t.items, strict=True)]
+            items = dict(zip(t.cls._fields, t.items, strict=True))
+            fields = [f"    {self._member(t.cls, f, items[f])}{c_name(f)};" for f in self.members(t.cls)]
+            fields = fields or ["    char nothing;"]
             name, doc = self._named(t.cls.__name__), t.cls.__doc__ or ""
             described = "" if doc.startswith(f"{t.cls.__name__}(") else comment(doc)
             self.declare(name, f"{described}typedef struct {{\n" + "\n".join(fields) + f"\n}} {name};\n")

@@ -100,31 +100,40 @@ class StaticData:
         self._fields = fields_read(text)
         self.n_constant = self.n_memory = 0  # bytes
         self._arrays: dict[int, tuple[str, Any]] = {}  # by identity, with the array, so that it stays alive
-        self.lines = ["static double pfk_nothing[1]; /* where there are no numbers */"]
+        self.lines = ["static pfk_real pfk_nothing[1]; /* where there are no numbers */"]
 
-    def constants(self, name: str, value: Any) -> None:
-        """Write the arrays of a NamedTuple as constants."""
-        for path, array in _arrays(name, value):
-            self._put(path, array, is_constant=True)
+    def constants(self, name: str, owner: Any, *fields: str) -> None:
+        """Write the arrays in some fields of a NamedTuple as constants."""
+        for field in (each for each in self._program.spell.members(type(owner)) if each in fields):
+            for path, array in self._read_in(f"{name}.{field}", getattr(owner, field)):
+                self._put(path, array, is_constant=True)
 
     def variable(self, name: str, value: tuple[Any, ...]) -> None:
         """Write a NamedTuple; its arrays that are no constants are memory."""
-        for path, array in _arrays(name, value):
+        for path, array in self._read_in(name, value):
             self._put(path, array, is_constant=False)
         kind = self._program.spell.value(self._program.type_of(value))
         self.lines.append(f"static const {kind} pfk_{name} = {self._made(value)};")
 
-    def _is_read(self, path: str) -> bool:
-        return all(f"{field}_" in self._fields or field in self._fields for field in path.split(".")[1:])
+    def _read_in(self, path: str, value: Any) -> Iterator[tuple[str, Any]]:
+        """Arrays in a NamedTuple that are read, with the names that lead there."""
+        if isinstance(value, np.ndarray):
+            yield path, value
+        elif isinstance(value, tuple):
+            for name in self._program.spell.members(type(value)):
+                yield from self._read_in(f"{path}.{name}", getattr(value, name))
+
+    def _is_read(self, field: str) -> bool:
+        return f"{field}_" in self._fields or field in self._fields
 
     def _put(self, path: str, array: Any, *, is_constant: bool) -> None:
-        if id(array) in self._arrays or not array.size or not self._is_read(path):
+        if id(array) in self._arrays or not array.size:
             return
         name = f"pfk_{path.replace('.', '_')}"
         self._arrays[id(array)] = name, array
         element = self._element(array)
         self._require_fitting(path, array)
-        if read := [field for field in array.dtype.names or () if self._is_read(f".{field}")]:
+        if read := [field for field in array.dtype.names or () if self._is_read(field)]:
             array = array[read]
         fields = [array.dtype[field] for field in array.dtype.names or ()] or [array.dtype]
         size = array.size * sum(each.itemsize // 8 * (self._size if each.base.kind == "f" else 4) for each in fields)
@@ -145,21 +154,19 @@ class StaticData:
 
     def _made(self, value: Any) -> str:
         if isinstance(value, tuple):
-            return "{" + ", ".join(map(self._made, value)) + "}"
+            members = self._program.spell.members(type(value))
+            made = [self._member(type(value).__name__, name, getattr(value, name)) for name in members]
+            return "{" + (", ".join(made) or "0") + "}"
         if not isinstance(value, np.ndarray):
             return literal(value) if isinstance(value, float) else str(int(value))
-        sizes = ", ".join(map(str, value.shape))
-        known = self._arrays.get(id(value))
-        element = self._element(value)
-        return f"{{({element} *){'pfk_nothing' if known is None else known[0]}, {{{sizes}}}}}"
+        return f"{{{self._pointer(value)}, {{{', '.join(map(str, value.shape))}}}}}"
 
+    def _member(self, owner: str, name: str, value: Any) -> str:
+        return self._pointer(value) if (owner, name) in self._program.shapes else self._made(value)
 
-def _arrays(path: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Arrays in a NamedTuple, with the names that lead there."""
-    if isinstance(value, np.ndarray):
-        yield path, value
-    for field, item in zip(getattr(value, "_fields", ()), value, strict=False):
-        yield from _arrays(f"{path}.{field}", item)
+    def _pointer(self, array: Any) -> str:
+        known = self._arrays.get(id(array))
+        return f"({self._element(array)} *){'pfk_nothing' if known is None else known[0]}"
 
 
 def _values(array: Any) -> str:

@@ -70,8 +70,33 @@ class Translated(NamedTuple):
 
 
 def translated(tables: ControllerTables, conditions: set[str], precision: Precision) -> Translated:
-    """The kernels that a file needs, and its static data."""
-    program = Program(precision, INTEGER, _facts(tables), _everywhere(SINGLE) if precision == "float" else {})
+    """The kernels that a file needs, and its static data.
+
+    Values of tables that nothing reads are no facts, and without them less is read: so until nothing more is left out.
+    """
+    tolerances = _everywhere(SINGLE) if precision == "float" else {}
+    fields: set[tuple[str, str]] | None = None
+    facts: dict[tuple[str, str], set[int]] = {}
+    shapes: dict[tuple[str, str], tuple[int, ...]] = {}
+    loose: set[tuple[str, str]] = set()
+    while True:
+        facts |= _facts(tables, fields)
+        program = Program(precision, INTEGER, facts, tolerances, fields, shapes)
+        text = _translation(program, tables, conditions)
+        before, fields = fields, program.fields_read(text)
+        if fields == before and not program.of_other_shapes:
+            break
+        loose |= program.of_other_shapes if fields == before else set()
+        known = shapes | _shapes(tables, fields)
+        shapes = {key: shape for key, shape in known.items() if key not in loose}
+    text = _without_unread(text)
+    data = _data(tables, program, text, precision)
+    lines = _prefixed("\n".join(data.lines), program)
+    return Translated(_own(_prefixed(text, program)), lines, data.n_constant, data.n_memory)
+
+
+def _translation(program: Program, tables: ControllerTables, conditions: set[str]) -> str:
+    """The kernels that a file needs in C, without its prefix."""
     matrix, row, number = np.zeros((0, 0)), np.zeros(0), 0
     reaching, assembling = tables.reaching, tables.assembling
     calls: list[tuple[str, Any, tuple[Any, ...]]] = [
@@ -95,10 +120,7 @@ def translated(tables: ControllerTables, conditions: set[str], precision: Precis
             assert made.name == kernel.__name__ and not made.allocates, made.name
             names.append(made.name)
     used = f"int {', '.join(names)};\n"
-    text = _without_unread(program.text(used).removesuffix(used))
-    data = _data(tables, program, text, precision)
-    lines = _prefixed("\n".join(data.lines), program)
-    return Translated(_own(_prefixed(text, program)), lines, data.n_constant, data.n_memory)
+    return program.text(used).removesuffix(used)
 
 
 def _everywhere(tolerances: dict[tuple[str, str], float]) -> dict[tuple[str, str], float]:
@@ -113,11 +135,11 @@ def _everywhere(tolerances: dict[tuple[str, str], float]) -> dict[tuple[str, str
     }
 
 
-def _facts(tables: ControllerTables) -> dict[tuple[str, str], set[int]]:
-    """Values of the integers in the tables, and lengths of arrays."""
+def _facts(tables: ControllerTables, fields: set[tuple[str, str]] | None) -> dict[tuple[str, str], set[int]]:
+    """Values of the integers in the tables, and lengths of arrays: of those in the fields that are read, if known."""
     facts: dict[tuple[str, str], set[int]] = {}
     names = Program().records
-    for value in _parts(tables):
+    for value in _parts(tables, fields):
         for field, item in zip(value._fields, value, strict=True):
             if isinstance(item, np.ndarray) and type(value).__name__ not in NOT_CONSTANT:
                 facts.setdefault((type(value).__name__, field), set()).add(len(item))
@@ -133,12 +155,23 @@ def _facts(tables: ControllerTables) -> dict[tuple[str, str], set[int]]:
     return facts
 
 
-def _parts(value: Any) -> Iterator[Any]:
-    """A NamedTuple and those in it."""
+def _shapes(tables: ControllerTables, fields: set[tuple[str, str]] | None) -> dict[tuple[str, str], tuple[int, ...]]:
+    """The shapes of arrays that are the same in every NamedTuple of the tables that has them."""
+    shapes: dict[tuple[str, str], set[tuple[int, ...]]] = {}
+    for value in _parts(tables, fields):
+        for field, item in zip(value._fields, value, strict=True):
+            if isinstance(item, np.ndarray) and type(value).__name__ not in NOT_CONSTANT:
+                shapes.setdefault((type(value).__name__, field), set()).add(item.shape)
+    return {key: known.pop() for key, known in shapes.items() if len(known) == 1}
+
+
+def _parts(value: Any, fields: set[tuple[str, str]] | None) -> Iterator[Any]:
+    """A NamedTuple and those in its fields that are read, in all if it is not known which."""
     if isinstance(value, tuple):
         yield value
-        for item in value:
-            yield from _parts(item)
+        for name in type(value)._fields:  # type: ignore[attr-defined]
+            if fields is None or isinstance(value, ControllerTables) or (type(value).__name__, name) in fields:
+                yield from _parts(getattr(value, name), fields)
 
 
 def _without_unread(text: str) -> str:
@@ -153,32 +186,28 @@ def _without_unread(text: str) -> str:
     return re.sub(rf"typedef struct \{{\n([^{{}}]*)\}} (?:{records});\n", shortened, text)
 
 
+LINKS = ("motions", "numbers", "sizes", "home", "bodies", "pairs", "least")
+"""What is constant of links, as far as they have it."""
+
+
 def _data(tables: ControllerTables, program: Program, text: str, precision: Precision) -> StaticData:
     data = StaticData(program, text, 8 if precision == "double" else 4)
     reaching, projecting = tables.reaching, tables.projecting
-    for name in ("near", "far", "whole_near", "whole_far", "home", "ways", "tilt"):
-        data.constants(f"reaching.{name}", getattr(reaching, name))
-    for name in ("motions", "numbers", "sizes", "home", "bodies", "pairs", "least"):
-        data.constants(f"reaching.links.{name}", getattr(reaching.links, name))
+    data.constants("reaching", reaching, "near", "far", "whole_near", "whole_far", "home", "ways", "tilt")
+    data.constants("reaching.links", reaching.links, *LINKS)
     if tables.assembling is not None:
-        data.constants("assembling.stays", tables.assembling.stays)
-        data.constants("assembling.seeds", tables.assembling.seeds)
+        data.constants("assembling", tables.assembling, "stays", "seeds")
     if tables.series is not None:
-        for name in ("motions", "end", "home", "units", "length"):
-            data.constants(f"series.{name}", getattr(tables.series, name))
+        data.constants("series", tables.series, "motions", "end", "home", "units", "length")
     if tables.driving is not None:
-        for name in (each for each in tables.driving.moving._fields if each != "gravity"):
-            data.constants(f"driving.moving.{name}", getattr(tables.driving.moving, name))
-        for name in ("numbers", "axes", "tilts", "units"):
-            data.constants(f"driving.{name}", getattr(tables.driving, name))
+        moving = tables.driving.moving
+        data.constants("driving.moving", moving, *(each for each in moving._fields if each != "gravity"))
+        data.constants("driving", tables.driving, "numbers", "axes", "tilts", "units")
     if projecting is not None:
         own = projecting.tables
-        groups = ("projecting.tables", own), ("projecting.tables.plan", own.plan)
-        for place, group in groups:
-            for name in (each for each in group._fields if each not in ("plan", "links")):
-                data.constants(f"{place}.{name}", getattr(group, name))
-        for name in ("sizes", "home", "bodies", "pairs", "least"):
-            data.constants(f"projecting.tables.plan.links.{name}", getattr(own.plan.links, name))
+        data.constants("projecting.tables", own, *(each for each in own._fields if each != "plan"))
+        data.constants("projecting.tables.plan", own.plan, *(each for each in own.plan._fields if each != "links"))
+        data.constants("projecting.tables.plan.links", own.plan.links, *LINKS)
     for name, value in zip(tables._fields, tables, strict=True):
         if value is not None:
             data.variable(name, value)
