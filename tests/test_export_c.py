@@ -292,9 +292,10 @@ def test_the_file_is_cpp_too_and_arms_that_follow_in_more_than_one_way_do_so_in_
 @pytest.mark.skipif(not COMPILERS or not all(map(shutil.which, ("g++", "nm"))), reason="no C, C++ and nm here")
 def test_a_program_in_cpp_calls_the_file_compiled_as_c_which_needs_mathematics_alone(folder: Path) -> None:
     (folder / "main.cpp").write_text(
-        '#define DELTA_DECLARATIONS_ONLY\n#include "delta.c"\n#include <cstdio>\n'
+        '#include "delta.h"\n#include <cstdio>\n'
         "int main() { delta_pose pose; double found[DELTA_ACTUATORS]; delta_home(&pose); pose.p[2] += 1.0;"
-        " delta_pose out = pose; if (delta_ik(&pose, &out, found)) return 1;"
+        " static delta_memory own; delta_begin(&own);"
+        " delta_pose out = pose; if (delta_ik(&own, &pose, &out, found)) return 1;"
         ' std::printf("%.12g %.12g %.12g", found[0], found[1], found[2]); }'
     )
     for command in (

@@ -276,7 +276,9 @@ JOINTS_DRIVER = """
 #include HOSTILE
 int main(int argc, char **argv)
 {
+    static pfk_memory memory;
     double q[PFK_JOINTS], rates[PFK_JOINTS] = {1.0, 2.0};
+    pfk_begin(&memory);
     if (argc > 1 && !strcmp(argv[1], "hostile"))
         return hostile_all() != 0;
     while (fread(q, sizeof(double), PFK_JOINTS, stdin) == PFK_JOINTS) {
@@ -285,9 +287,10 @@ int main(int argc, char **argv)
         int j;
         if (fread(given, sizeof(double), PFK_ACTUATORS, stdin) != PFK_ACTUATORS)
             return 1;
-        codes[0] = pfk_to_actuators(q, x);
-        codes[1] = pfk_to_joints(given, back, 0);
-        if (pfk_jacobian(q, J) || pfk_speeds(q, rates, speeds) || pfk_torques(q, rates, torques))
+        codes[0] = pfk_to_actuators(&memory, q, x);
+        codes[1] = pfk_to_joints(&memory, given, back, 0);
+        if (pfk_jacobian(&memory, q, J) || pfk_speeds(&memory, q, rates, speeds) ||
+            pfk_torques(&memory, q, rates, torques))
             return 1;
         for (j = 0; j < PFK_ACTUATORS; ++j)
             power += speeds[j] * torques[j];

@@ -208,9 +208,11 @@ class Expressions:
             t = owner.type.items[owner.type.cls._fields.index(node.attr)]
             self.fields.add((owner.type.cls.__name__, node.attr))
             text, more = f"{self.path_of(owner)}{c_name(node.attr)}", effects([owner])
+            if (owner.type.cls.__name__, node.attr) in self.program.layout.constant:
+                return Value(text, t, is_lasting=True, **more)
             if isinstance(t, Struct):
                 return Value(f"&{text}", t, UNARY, is_lasting=owner.is_lasting, **more)
-            shape = self.program.shapes.get((owner.type.cls.__name__, node.attr))
+            shape = self.program.layout.shapes.get((owner.type.cls.__name__, node.attr))
             inner = None if shape is None else (text, shape)
             return Value(text, t, possible=self.fact(owner.type.cls.__name__, node.attr), inner=inner, **more)
         if isinstance(owner.type, Array) and node.attr == "shape":

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,6 +40,7 @@ class Array:
     ndim: int
     is_contiguous: bool = True
     width: int = 0  # constant length of the rows, if it is known
+    shape: tuple[int, ...] | None = None  # of a parameter that is a pointer
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,15 @@ class Struct:
 
     cls: Any
     items: tuple[Any, ...] = field(hash=False)  # long, and looked up at every call
+
+
+class Layout(NamedTuple):
+    """How NamedTuples are structs of C; fields by the names of their class and of themselves."""
+
+    fields: frozenset[tuple[str, str]] | None = None  # that are read: others are left out; all if None
+    shapes: Mapping[tuple[str, str], tuple[int, ...]] = {}  # of arrays that have one wherever they are: pointers then
+    constant: frozenset[tuple[str, str]] = frozenset()  # NamedTuples that are constant: pointers too
+    views: frozenset[tuple[Any, str]] = frozenset()  # parameters that are arrays of several shapes: no pointers
 
 
 def type_of(value: Any, records: dict[Any, str]) -> Any:
@@ -111,11 +122,10 @@ class Spelling:
     def __init__(
         self,
         declare: Any,
-        fields: set[tuple[str, str]] | None = None,
-        shapes: dict[tuple[str, str], tuple[int, ...]] | None = None,
+        layout: Layout,
     ) -> None:
         self.declare = declare  # takes a name and its text
-        self.fields, self.shapes = fields, shapes or {}
+        self.layout = layout
         self.known: dict[Any, str] = {}
         self.taken: set[str] = set()
 
@@ -123,6 +133,8 @@ class Spelling:
         """The C type of a variable, with a space where a name may follow."""
         if isinstance(t, str):
             return {NOTHING: "void ", BOOL: "bool ", INTEGER: "integer ", REAL: "real "}[t]
+        if isinstance(t, Array) and t.shape is not None:
+            return self.pointer(t)
         name = self.value(t)
         return f"{name} *" if isinstance(t, Record) else f"const {name} *" if isinstance(t, Struct) else f"{name} "
 
@@ -140,14 +152,17 @@ class Spelling:
 
     def members(self, cls: Any) -> list[str]:
         """The fields of a NamedTuple that its struct has."""
-        return [each for each in cls._fields if self.fields is None or (cls.__name__, each) in self.fields]
+        read = self.layout.fields
+        return [each for each in cls._fields if read is None or (cls.__name__, each) in read]
 
     def pointer(self, t: Array) -> str:
         """The C type of a pointer to an array of known shape, with a space where a name may follow."""
         return f"{self.value(t.element)} *"
 
     def _member(self, cls: Any, field: str, t: Any) -> str:
-        return self.pointer(t) if (cls.__name__, field) in self.shapes else self.stored(t)
+        if (cls.__name__, field) in self.layout.constant:
+            return self.variable(t)
+        return self.pointer(t) if (cls.__name__, field) in self.layout.shapes else self.stored(t)
 
     def _named(self, wanted: str) -> str:
         name, k = wanted, 2

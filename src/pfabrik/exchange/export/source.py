@@ -166,7 +166,9 @@ def source(
     made = translated(tables, conditions, precision)
     included = {
         "machine.h": _machine_h(machine, tables, parts, path),
+        "memory.h": made.types,
         "kernels.h": made.kernels,
+        "filling.h": made.filling,
         "tables.h": "\n".join([made.data, *_tables(machine, precision, parts, path, len(tables.reaching.ways))]),
     }
     if checks is not None:
@@ -174,6 +176,7 @@ def source(
     text = with_finite_results(selected(routines[routines.index("#ifndef") :], conditions))
     text = re.sub(r'^#include "(.*)"\n', lambda match: included[match[1]], text, flags=re.MULTILINE)
     body = in_words(re.sub(r"\n{3,}", "\n\n", f"{_header(machine, made, parts, path)}\n{text}"), name, precision)
+    body = body.replace(f"{name.upper()}_MEMORY_", f"{name}_memory")
     return body.replace("_SELF_TEST FILE -lm", f"_SELF_TEST {comment(file)} -lm", 1)
 
 
@@ -240,8 +243,12 @@ def _tables(
     }
     yield f"enum {{ {', '.join(f'PFK_{name} = {count}' for name, count in counts.items())} }};"
     yield f"static const pfk_real pfk_reference[3] = {literal(np.asarray(machine.mechanism.reference_point))};"
-    if "rates" in parts:
+    if {"ik", "rates"} & {*parts}:
         yield f"static const pfk_real pfk_units[PFK_ACTUATORS] = {literal(_units(machine))};"
+    if "ik" in parts:
+        homes = literal(np.array([driven.home for driven in machine.driven]))
+        yield f"static const pfk_real pfk_home_actuators[PFK_ACTUATORS] = {homes};"
+    if "rates" in parts:
         yield f"static const pfk_real pfk_rate_units[] = {literal(rate_units(machine, path))};"
     if "nearest" in parts:
         of_ranges = [size if each.is_length else 1.0 for each in machine.limited for _ in range(2)]
@@ -289,9 +296,11 @@ def _header(machine: Machine, made: Translated, parts: Sequence[str], path: Join
     lines = [
         f"The kinematics of '{mechanism.name}', written by pfabrik from its description.",
         "",
-        "C99, and C++ as it is; only the C library's mathematics. Nothing is allocated, and no answer depends on an",
-        "earlier one; but the memory of a call is static, so that one call is to end before the next begins.",
-        f"On 32 bits this is {made.memory:,} bytes of RAM, and tables are {made.constants:,} bytes of constants.",
+        "C99, and C++ as it is; only the C library's mathematics. Nothing is allocated, and nothing is static but",
+        "constants: the memory of calls is the caller's, one PFK_MEMORY_ for each machine and each thread or interrupt",
+        "that calls. `pfk_begin` fills it, and it may not be moved then. No answer depends on an earlier one, but that",
+        "it is told whether drives jump, and how far they move.",
+        f"On 32 bits this memory is {made.memory:,} bytes, and tables are {made.constants:,} bytes of constants.",
         f"Lengths in {unit}, angles in radians. A pose maps platform coordinates, as at home and from the reference",
         "point, to base coordinates: p is where the reference point is, R the rotation.",
         f"Task: {' '.join(mechanism.task)}."
@@ -299,8 +308,7 @@ def _header(machine: Machine, made: Translated, parts: Sequence[str], path: Join
         "All of it in the working mode of home: each crank and carriage on the side where it is there.",
         "",
         "The tables are of this machine; of the functions, what it never needs is left out.",
-        "Include it with PFK_DECLARATIONS_ONLY defined for the declarations alone; with PFK_SELF_TEST defined it is a",
-        "program that checks itself:",
+        "With PFK_SELF_TEST defined it is a program that checks itself:",
         "    cc -std=c99 -D PFK_SELF_TEST FILE -lm -o check && ./check",
         "",
         "actuator  joint                 home",

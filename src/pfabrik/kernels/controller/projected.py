@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...common.arrays import Floats, Records
+from ...common.arrays import Floats, Ints, Records
 from .._jit import routine
 from ..legs.complete_poses import is_pose
 from ..pose.answer_row import answer_row, errors
 from ..pose.search_records import PoseSolutions
 from ..pose.tables import AnswerScratch, Question, Start, Tables
 from ..projecting import PRICED, weighted_distance
+from ..rows import CERTAIN, HOLD, REACHED, UNSURE
 from ..rows import PROJECTED as IS_PROJECTED
-from ..rows import REACHED, UNSURE
 from ..search_constants import MOVED, SUSPICIOUS, UNDONE
 from ..vectors import copy_row, copy_table
 from .reached import BUDGET, JUMPED, NO_POSE, PROJECTED, Reaching, rest
+
+WHOLE, NOT_FOUND = -1, -2
+"""All of a target is reached; no feasible pose was found."""
 
 
 class Projecting(NamedTuple):
@@ -30,6 +33,7 @@ class Projecting(NamedTuple):
     back: PoseSolutions  # one: where the way back to the target before leads
     last: Start  # the last answer
     last_targets: Floats  # (1, 4, 4) [length]: that it answers
+    held: Ints  # (1,): what of the target is held (HOLD_...), WHOLE, or NOT_FOUND
 
 
 @routine
@@ -57,12 +61,13 @@ def project_target(
     copy_row(actuators, start.actuators[0])
     asked["seeds"], asked["steps"], asked["effort"] = seeds, steps, steps * (seeds + 1)
     remembers = is_last(own)
-    asked["has_start"] = 1 if remembers or seeds == 0 else 0
+    asked["has_start"], own.held[0] = 1 if remembers or seeds == 0 else 0, NOT_FOUND
     status = answer_row(own.tables, own.scratch, start, own.targets, own.question.asked[0], own.answer)
     if status != REACHED and status != IS_PROJECTED and status != UNSURE:
         return BUDGET
     code = PROJECTED if own.scratch.nearest.search.control[0]["steps"] < steps else BUDGET
     code = 0 if status == REACHED else code
+    own.held[0] = own.answer.counters[0, HOLD] % CERTAIN if code != 0 else WHOLE
     if code == PROJECTED and remembers and jumps(own):
         code = JUMPED
     copy_table(own.answer.poses[0], pose)
