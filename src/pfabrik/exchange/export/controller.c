@@ -51,6 +51,7 @@ enum {
 typedef struct {
     int held;       /* of a target out of reach: 0 nothing, 1 its orientation, 2 its position; -1 if all is reached */
     int jumped;     /* 1 if no motion leads there from the last pose: drives jump */
+    int stretched;  /* the number of a leg at its dead point there, if `holding` is asked for; 0 if there is none */
     pfk_real moved; /* the largest move of a drive since the last answer, or home [L or rad] */
 } pfk_told;
 
@@ -78,8 +79,7 @@ int pfk_ik(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_real 
    nothing is written where none is found. The search takes at most `steps` steps, a dozen mostly, from there and from
    each of up to `starts` more places, of PFK_STARTS; 0 in a control loop: less than `steps` x (`starts` + 2) together,
    and as many again to tell if drives jump. `memory->told` says more of the answer. `holding`, which may be 0,
-   is filled with 1 for the limits, of PFK_LIMITS, that the pose is at: none where a leg is stretched, at a dead point,
-   which pfk_limits and pfk_ik then say with the code of the leg. */
+   is filled with 1 for the limits, of PFK_LIMITS, that the pose is at: none where legs are stretched, at dead points. */
 int pfk_nearest(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps, int starts,
                 char *holding);
 /* What a control loop calls: pfk_ik, and pfk_nearest where that has no answer. */
@@ -342,6 +342,7 @@ static void pfk_tell(pfk_memory *memory, const pfk_real actuators[PFK_ACTUATORS]
         return;
     memory->told.held = held;
     memory->told.jumped = jumped;
+    memory->told.stretched = 0;
     memory->told.moved = 0.0;
     for (i = 0; i < PFK_ACTUATORS; ++i) {
         move = fabs(actuators[i] - memory->actuators[i]) / pfk_units[i];
@@ -389,6 +390,7 @@ int pfk_nearest(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_
         holding[i] = 0;
     if (!holding || pfk_rest(&memory->reaching, pfk_opened(pose, own)) >= PFK_LEG)
         return code;
+    memory->told.stretched = (int)pfk_stretched_leg(memory->reaching.near_, &memory->reaching.scratch);
     for (i = 0; i < PFK_LIMITS; ++i)
         holding[i] = memory->reaching_slack[i] <= PFK_ACTIVE * pfk_limit_units[i];
     return code;

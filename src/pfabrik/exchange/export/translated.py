@@ -16,7 +16,7 @@ from ...kernels.controller.driven import put_exerted
 from ...kernels.controller.joints_in_series import put_joints, walk
 from ...kernels.controller.projected import project_target
 from ...kernels.controller.rates import put_rates
-from ...kernels.controller.reached import measure, put_bodies, put_reached, put_turns, reach, rest
+from ...kernels.controller.reached import measure, put_bodies, put_reached, put_turns, reach, rest, stretched_leg
 from ...kernels.legs import records as K
 from ...kernels.pose.search_records import SETTINGS
 from ...kernels.pose.tables import MACHINE
@@ -97,7 +97,7 @@ def translated(tables: ControllerTables, conditions: set[str], precision: Precis
     read, members = fields_read(whole), "\n".join(data.members)
     types = {name: text for name, text in program.needed(members).items() if TYPE.match(text)}
     kernels = {name: text for name, text in program.needed(used).items() if name not in types}
-    told = 8 + (len(tables.reaching.near.driven) + 1) * (8 if precision == "double" else 4)
+    told = 12 + (len(tables.reaching.near.driven) + 1) * (8 if precision == "double" else 4)
     memory = f"{MEMORY}typedef struct {{\n{members}\n{TOLD}}} pfk_memory;\n"
     return Translated(
         OWN_INTEGER + _own_types(_prefixed(_without_unread("\n".join(types.values()), read) + memory, program)),
@@ -125,6 +125,7 @@ def _translation(program: Program, tables: ControllerTables, conditions: set[str
         ("JOINTS", walk, (tables.series, row)),
         ("TO_JOINTS", put_joints, (tables.series, assembling, reaching, row, row)),
         ("EFFORT", put_exerted, (tables.driving, reaching, matrix, row, row, row, row)),
+        ("NEAREST", stretched_leg, (reaching.near, reaching.scratch)),
         ("NEAREST", project_target, (tables.projecting, reaching, matrix, matrix, row, number, number)),
     ]
     names = []

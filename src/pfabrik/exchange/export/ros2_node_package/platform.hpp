@@ -268,6 +268,7 @@ private:
   {
     std::fill(slack_.begin(), slack_.end(), kNaN);
     resting_ = @NAME@_limits(&memory_, &commanded_.pose, slack_.data());
+    resting_ = resting_ == 0 && memory_.told.stretched > 0 ? @MACRO@_LEG + memory_.told.stretched : resting_;
     @MEASURE_LINKS@
     nearest_ = kLimits;
     double least = kInfinity;
