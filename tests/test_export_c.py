@@ -228,7 +228,26 @@ def test_a_file_checks_itself_with_poses_that_have_one_answer_alone(monkeypatch:
 def test_a_self_test_fails_where_the_machine_is_another() -> None:
     text, place = text_of("stewart"), "/* base_end_point */ {"
     code, words = checks_itself(compiled(text.replace(place, f"{place}1.0 + ", 1), driver=None))
-    assert code == 1 and "actuator 0" in words
+    assert code == 1 and "actuators of pose 0" in words and "torques 0" in words
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("function", "said"), [("nearest", "target out of reach 0"), ("fk", "back to pose"), ("torques", "torques 0")]
+)
+def test_a_self_test_fails_where_a_function_is_another(function: str, said: str) -> None:
+    """One whose first number is twice what it should be."""
+    text = text_of("stewart")
+    (head,) = re.findall(rf"^(int pfk_{function}\((?:[^()]*)\))\n\{{", text, re.MULTILINE)
+    name = {"nearest": "pose->p[0]", "fk": "pose->p[0]", "torques": "torques[0]"}[function]
+    given = ", ".join(re.findall(r"(\w+)(?:\[\w*\])?(?:,|\)$)", head.partition("(")[2]))
+    other = head.replace(f"pfk_{function}", f"pfk_other_{function}")
+    body = f"    const int code = pfk_other_{function}({given});\n    {name} *= 2.0;\n    return code;\n"
+    caller = f"{head}\n{{\n{body}}}\n"
+    place = text.index("#ifdef PFK_SELF_TEST\n")
+    before = text[:place].replace(f"\n{head}\n{{", f"\nstatic {other}\n{{")
+    code, words = checks_itself(compiled(f"{before}{caller}{text[place:]}", driver=None))
+    assert code == 1 and said in words
 
 
 def slide(name: str = "J", **more: Any) -> pf.Mechanism:

@@ -224,12 +224,12 @@ def test_the_file_measures_what_the_library_does_and_answers_where_links_are_apa
 @needs_compiler
 def test_the_self_test_compares_distances_and_finds_links_of_another_thickness() -> None:
     text = text_of("solids", "double")
-    rows = re.findall(r"^    \{\{\{.*, ([01]), (\S+)\},?$", text, re.MULTILINE)
+    rows = re.findall(r"^    \{\{\{.*, ([01]), [01], (\S+)\},?$", text, re.MULTILINE)
     assert len(rows) == 50 and {kept for kept, _ in rows} == {"0", "1"}
     assert any(float(distance) < machine("solids").clearance for _, distance in rows)
     wrong = re.sub(r"(pfk_reaching_links_sizes\[\d+\] = \{\s+\S+ )", r"\1 0.001 + ", text)  # of the first, all around
     code, words = checks_itself(compiled(wrong, driver=None))
-    assert code == 1 and ", links: " in words
+    assert code == 1 and "links at pose" in words
 
 
 def test_a_machine_without_a_clearance_is_exported_as_one_without_thickness() -> None:

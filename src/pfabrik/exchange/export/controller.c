@@ -707,71 +707,163 @@ int pfk_speeds_back(pfk_memory *memory, pfk_at at, const pfk_real speeds[PFK_ACT
 #include <stdio.h>
 
 #if CHECKED
-/* A pose, the actuators there, and whether those are within all limits. */
+/* A pose, the actuators there, whether those are within all limits, and whether forward kinematics leads there from
+   home. */
 #if CLEARANCE
 /* And the least distance between its links. */
 #endif
 typedef struct {
     pfk_pose target;
     pfk_real actuators[PFK_ACTUATORS];
-    int kept;
+    int kept, led;
 #if CLEARANCE
     pfk_real distance;
 #endif
 } pfk_check;
 
+#if FAR_CHECKS
+/* A target out of reach, and how far the reference point of its nearest pose is from it. */
+typedef struct {
+    pfk_pose target;
+    pfk_real distance;
+} pfk_far_check;
+
+#endif
+#if TORQUE_CHECKS || EFFORT_CHECKS
+/* A pose, a force and moment there or a twist that is its change too, and the torques or forces of the actuators. */
+typedef struct {
+    pfk_pose pose;
+    pfk_real twist[6], actuators[PFK_ACTUATORS];
+} pfk_load_check;
+
+#endif
 #include "checks.h"
 
+static int pfk_wrong;
+
+/* Counts what differs from the library's answer by more than it may, and prints by how many times. */
+static void pfk_compare(const char *what, int row, pfk_real found, pfk_real expected, pfk_real most)
+{
+    const pfk_real off = fabs(found - expected) / most;
+    if (off <= 1.0)
+        return;
+    printf("%s %d: %ld times farther off than it may be\n", what, row, off < 1e9 ? (long)off : 1000000000L);
+    ++pfk_wrong;
+}
+
+static void pfk_compare_codes(const char *what, int row, int is_right, int code)
+{
+    if (is_right)
+        return;
+    printf("%s %d: %s\n", what, row, pfk_what(code));
+    ++pfk_wrong;
+}
+
+#if FAR_CHECKS
+static void pfk_check_far(pfk_memory *memory)
+{
+    pfk_real actuators[PFK_ACTUATORS] = {0.0}, away, square;
+    pfk_pose pose;
+    int i, j, code;
+    for (i = 0; i < PFK_FAR_CHECKS; ++i) {
+        pfk_home(&pose);
+        code = pfk_nearest(memory, &pfk_far_checks[i].target, &pose, actuators, 200, PFK_STARTS, 0);
+        pfk_compare_codes("target out of reach", i, code == PFK_PROJECTED || code == PFK_JUMPED, code);
+        for (square = 0.0, j = 0; j < 3; ++j) {
+            away = pose.p[j] - pfk_far_checks[i].target.p[j];
+            square += away * away;
+        }
+        pfk_compare("target out of reach", i, sqrt(square), pfk_far_checks[i].distance, PFK_EXACT_NEAREST * PFK_SIZE);
+    }
+}
+
+#endif
+#if TORQUE_CHECKS || EFFORT_CHECKS
+static void pfk_compare_loads(const char *what, int row, const pfk_real *found, const pfk_real *expected)
+{
+    pfk_real most = 0.0;
+    int j;
+    for (j = 0; j < PFK_ACTUATORS; ++j)
+        most = fabs(expected[j]) > most ? fabs(expected[j]) : most;
+    for (j = 0; j < PFK_ACTUATORS; ++j)
+        pfk_compare(what, row, found[j], expected[j], PFK_EXACT_LOADS * most);
+}
+
+#endif
+#if TORQUE_CHECKS
+static void pfk_check_torques(pfk_memory *memory)
+{
+    pfk_real found[PFK_ACTUATORS];
+    int i, code;
+    for (i = 0; i < PFK_TORQUE_CHECKS; ++i) {
+        code = pfk_torques(memory, &pfk_torque_checks[i].pose, pfk_torque_checks[i].twist, found);
+        pfk_compare_codes("torques", i, code == 0, code);
+        if (code == 0)
+            pfk_compare_loads("torques", i, found, pfk_torque_checks[i].actuators);
+    }
+}
+
+#endif
+#if EFFORT_CHECKS
+static void pfk_check_effort(pfk_memory *memory)
+{
+    const pfk_real gravity[3] = {0.0, 0.0, -9.80665}, *twist;
+    pfk_real found[PFK_ACTUATORS];
+    int i, code;
+    for (i = 0; i < PFK_EFFORT_CHECKS; ++i) {
+        twist = pfk_effort_checks[i].twist;
+        code = pfk_effort(memory, &pfk_effort_checks[i].pose, twist, twist, gravity, found);
+        pfk_compare_codes("forces", i, code == 0, code);
+        if (code == 0)
+            pfk_compare_loads("forces", i, found, pfk_effort_checks[i].actuators);
+    }
+}
+
+#endif
 int main(void)
 {
     static pfk_memory own, *const memory = &own;
-    pfk_real found[PFK_ACTUATORS], size;
+    pfk_real found[PFK_ACTUATORS];
 #if CLEARANCE
     pfk_real distance;
 #endif
     pfk_pose pose;
-    int i, j, code, wrong = 0;
+    int i, j, code;
     pfk_begin(memory);
     for (i = 0; i < PFK_CHECKS; ++i) {
         pfk_home(&pose);
         code = pfk_ik(memory, &pfk_checks[i].target, &pose, found);
-        if ((code == 0) != pfk_checks[i].kept) {
-            printf("pose %d: %s\n", i, pfk_what(code));
-            ++wrong;
-        }
-        for (j = 0; code == 0 && j < PFK_ACTUATORS; ++j) {
-            size = pfk_check_units[j];
-            if (!(fabs(found[j] - pfk_checks[i].actuators[j]) <= PFK_EXACT * size)) {
-                printf("pose %d, actuator %d: %.9g\n", i, j, (double)found[j]);
-                ++wrong;
-            }
-        }
+        pfk_compare_codes("pose", i, (code == 0) == pfk_checks[i].kept, code);
+        for (j = 0; code == 0 && j < PFK_ACTUATORS; ++j)
+            pfk_compare("actuators of pose", i, found[j], pfk_checks[i].actuators[j], PFK_EXACT * pfk_units[j]);
 #if CLEARANCE
         if (code == 0) {
             pfk_clearance(memory, &pose, &distance, &j);
-            if (!(fabs(distance - pfk_checks[i].distance) <= PFK_EXACT * PFK_SIZE)) {
-                printf("pose %d, links: %.9g\n", i, (double)distance);
-                ++wrong;
-            }
+            pfk_compare("links at pose", i, distance, pfk_checks[i].distance, PFK_EXACT * PFK_SIZE);
         }
 #endif
 #if FK
-        if (code == 0) {
-            pfk_pose back = pose;
-            if (pfk_fk(memory, found, &back, 0) != 0) {
-                printf("pose %d: no way back\n", i);
-                ++wrong;
-            }
-            for (j = 0; j < 3; ++j)
-                if (!(fabs(back.p[j] - pose.p[j]) <= PFK_EXACT * PFK_SIZE)) {
-                    printf("pose %d, back: %.9g\n", i, (double)back.p[j]);
-                    ++wrong;
-                }
+        if (code == 0 && pfk_checks[i].led) {
+            pfk_pose back;
+            pfk_home(&back);
+            code = pfk_fk(memory, found, &back, 0);
+            pfk_compare_codes("back to pose", i, code == 0, code);
+            for (j = 0; code == 0 && j < 3; ++j)
+                pfk_compare("back to pose", i, back.p[j], pose.p[j], PFK_EXACT_BACK * PFK_SIZE);
         }
 #endif
     }
-    printf("%d poses, %d wrong\n", PFK_CHECKS, wrong);
-    return wrong != 0;
+#if FAR_CHECKS
+    pfk_check_far(memory);
+#endif
+#if TORQUE_CHECKS
+    pfk_check_torques(memory);
+#endif
+#if EFFORT_CHECKS
+    pfk_check_effort(memory);
+#endif
+    printf("%d poses, %d wrong\n", PFK_CHECKS, pfk_wrong);
+    return pfk_wrong != 0;
 }
 #else
 int main(void)

@@ -22,6 +22,7 @@ from ...tolerances import TOLERANCES
 from .controller_tables import ControllerTables, controller_tables
 from .finite_results import with_finite_results
 from .machine_data import Machine
+from .self_test import are_led_from_home, far_checks, far_lines, load_checks, load_lines
 from .static_data import Precision, comment, in_words, literal, table, words
 from .translated import Translated, translated
 
@@ -33,6 +34,11 @@ N_TRIED = 400
 KEEP = Options(working_mode="keep")
 AGREEMENT: dict[Precision, float] = {"double": 1e-10, "float": 1e-4}
 """Tolerance to which actuators must agree [L or rad]: rounding may leave as much near a dead point."""
+
+BACK: dict[Precision, float] = {"double": 1e-9, "float": 1e-3}
+NEAREST: dict[Precision, float] = {"double": 1e-6, "float": 1e-3}
+LOADS: dict[Precision, float] = {"double": 1e-8, "float": 2e-3}
+"""Tolerances of where actuators lead and of distances from targets [L], and of torques and forces, as a share."""
 
 CLEAR = 1e-3
 """Margin beyond which a pose counts as inside or outside its limits without doubt, a share of the range."""
@@ -162,6 +168,8 @@ def source(
     routines = resources.files(__package__).joinpath("controller.c").read_text(encoding="utf-8")
     checks = checks_of(machine, "limits" in parts) if "ik" in parts else None
     conditions = features(machine, parts, path) | ({"CHECKED"} if checks is not None and len(checks.targets) else set())
+    asked = {} if checks is None else _asked(machine, checks, conditions, precision)
+    conditions |= {name for name, lines in asked.items() if lines}
     tables = controller_tables(machine, parts, path)
     made = translated(tables, conditions, precision)
     included = {
@@ -172,7 +180,8 @@ def source(
         "tables.h": "\n".join([made.data, *_tables(machine, precision, parts, path, len(tables.reaching.ways))]),
     }
     if checks is not None:
-        included["checks.h"] = _checks_h(checks, _units(machine), AGREEMENT[precision])
+        more = [line for lines in asked.values() for line in lines]
+        included["checks.h"] = "\n".join([*more, _checks_h(machine, checks, conditions, precision)])
     text = with_finite_results(selected(routines[routines.index("#ifndef") :], conditions))
     text = re.sub(r'^#include "(.*)"\n', lambda match: included[match[1]], text, flags=re.MULTILINE)
     body = in_words(re.sub(r"\n{3,}", "\n\n", f"{_header(machine, made, parts, path)}\n{text}"), name, precision)
@@ -187,6 +196,7 @@ def features(machine: Machine, parts: Sequence[str], path: JointPath | None = No
         "CLEARANCE": machine.links_kept(parts) is not None,
         "JOINTS": path is not None,
         "TO_ACTUATORS": path is not None and "ik" in parts,
+        "TORQUES": path is None and "rates" in parts,
         "TO_JOINTS": path is not None and "fk" in parts,
         "RESTS": {"limits", "nearest"} & {*parts} or (path is not None and "ik" in parts),
     }
@@ -276,16 +286,38 @@ def rate_units(machine: Machine, path: JointPath | None) -> Floats:
     return np.array([1.0 if each.kind == "angle" else size for each in path.coordinates])
 
 
-def _checks_h(checks: Checks, units: Floats, exact: float) -> str:
-    """Poses for the self-test, and the tolerance of actuators [L or rad]."""
-    lines = [f"#define PFK_EXACT {literal(exact)}", f"enum {{ PFK_CHECKS = {len(checks.targets)} }};"]
-    lines += [f"static const pfk_real pfk_check_units[PFK_ACTUATORS] = {literal(units)};", ""]
+def _asked(machine: Machine, checks: Checks, conditions: set[str], precision: Precision) -> dict[str, list[str]]:
+    """What the self-test asks beside actuators, by its condition in `controller.c`; nothing where there is nothing."""
+    asked: dict[str, list[str]] = {}
+    if "NEAREST" in conditions and len((far := far_checks(machine, checks.targets)).targets):
+        exact = f"#define PFK_EXACT_NEAREST {literal(NEAREST[precision])} /* of distances from targets [L] */"
+        asked["FAR_CHECKS"] = [exact, *far_lines(far)]
+    inside = checks.targets[checks.kept]
+    for part, name, moves in (("TORQUES", "torque", False), ("EFFORT", "effort", True)):
+        if part in conditions and len((loads := load_checks(machine, inside, moves=moves)).poses):
+            asked[f"{name.upper()}_CHECKS"] = list(load_lines(name, loads))
+    if {"TORQUE_CHECKS", "EFFORT_CHECKS"} & {*asked}:
+        exact = f"#define PFK_EXACT_LOADS {literal(LOADS[precision])} /* of torques and forces, a share */"
+        asked["LOADS"] = [exact]
+    return asked
+
+
+def _checks_h(machine: Machine, checks: Checks, conditions: set[str], precision: Precision) -> str:
+    """What the self-test asks and compares, and tolerances."""
+    lines = [f"#define PFK_EXACT {literal(AGREEMENT[precision])} /* of actuators [L or rad] */"]
+    lines.append(f"enum {{ PFK_CHECKS = {len(checks.targets)} }};")
+    if "FK" in conditions:
+        lines.append(f"#define PFK_EXACT_BACK {literal(BACK[precision])} /* of where actuators lead [L] */")
+    led = np.zeros(len(checks.targets), dtype=bool)
+    if "FK" in conditions:
+        led = are_led_from_home(machine, checks.targets, checks.actuators)
     distances = [""] * len(checks.targets)
     if checks.distances is not None:
         distances = [f", {literal(float(distance))}" for distance in checks.distances]
     rows = (
-        f"    {{{{{literal(target[:3, 3])}, {literal(target[:3, :3])}}}, {literal(actuators)}, {int(kept)}{distance}}}"
-        for target, actuators, kept, distance in zip(*checks[:3], distances, strict=True)
+        f"    {{{{{literal(target[:3, 3])}, {literal(target[:3, :3])}}}, {literal(actuators)}, "
+        f"{int(kept)}, {int(is_led)}{distance}}}"
+        for target, actuators, kept, is_led, distance in zip(*checks[:3], led, distances, strict=True)
     )
     return "\n".join([*lines, *table("pfk_check pfk_checks[PFK_CHECKS]", rows)])
 
