@@ -70,7 +70,7 @@ int main(void)
     pfk_begin(&memory);
     for (k = 0; k < sizeof targets / sizeof *targets; ++k) {
         pfk_pose target, pose, back;
-        int code, near = 0, fk = 0;
+        int code, near = 0, fk = 0, steps = 0;
         pfk_home(&pose);
         pfk_home(&back);
         for (i = 0; i < 3; ++i)
@@ -84,14 +84,15 @@ int main(void)
         counts[0] = counted();
         if (code == 0) {
             start();
-            fk = pfk_fk(&memory, a, &back, 0);
+            fk = pfk_fk(&memory, a, &back, &steps);
             counts[1] = counted();
         } else {
             start();
             near = pfk_nearest(&memory, &target, &pose, a, STEPS, STARTS, 0);
             counts[2] = counted();
         }
-        printf("%d %d %d %u %u %u", code, fk, near, counts[0], counts[1], counts[2]);
+        printf("%d %d %d %u %u %u %d %d", code, fk, near, counts[0], counts[1], counts[2], steps,
+               near ? memory.told.steps : 0);
         for (i = 0; i < 3; ++i)
             printf(" %.9g %.9g %.9g %.9g", (double)pose.R[i][0], (double)pose.R[i][1], (double)pose.R[i][2],
                    (double)pose.p[i]);
@@ -236,7 +237,7 @@ def told(
 def compared(machine: pf.Mechanism, known: Truth, said: Array) -> tuple[int, int, float]:
     """How many statuses differ from the library's, and how many nearest poses were found; how much farther [L]."""
     status = np.where(said[:, 0] == 0, 0, np.where(said[:, 2] == 0, 0, np.where(said[:, 2] == -4, 1, 9)))
-    poses = said[:, 6:].reshape(-1, 3, 4)
+    poses = said[:, 8:].reshape(-1, 3, 4)
     distance = [np.linalg.norm(each[:, :3, 3] - known.targets[:, :3, 3], axis=1) for each in (poses, known.poses)]
     both = (status == 1) & (known.status == 1)
     above = (distance[0] - distance[1])[both] / machine.characteristic_length
@@ -282,10 +283,14 @@ def main() -> int:
                     rows[-3] += [counts(said, 3), "", ""]
                     rows[-2] += [counts(said, 3), counts(said, 4), ""]
                     rows[-1] += [counts(said, column) for column in (3, 4, 5)]
+                    rows[-2] += [f"{said[:, 6].max():.0f}", ""]
+                    rows[-1] += [f"{said[:, column].max():.0f}" for column in (6, 7)]
+                    rows[-3] += ["", ""]
                 of = f"IK {counts(said, 3)}, FK {counts(said, 4)}, nearest {counts(said, 5)}"
+                most = f"most steps FK {said[:, 6].max():.0f}, nearest {said[:, 7].max():.0f}"
                 print(
                     f"  {precision:<6} statuses that differ {differ}, nearest {n_nearest}, farther by {above:.1e} L;"
-                    f" instructions {of}"
+                    f" instructions {of}; {most}"
                 )
     if given.docs and has_gcc and has_qemu:
         write_table(rows)
@@ -295,7 +300,8 @@ def main() -> int:
 def write_table(rows: list[list[str]]) -> None:
     """Put the table into its page."""
     columns = ["machine", "parts", "code", "constants", "memory", "stack", "`_ik`", "`_fk`", "`_nearest`"]
-    lines = [f"| {' | '.join(row)} |" for row in (columns, ["---"] * 2 + ["--:"] * 7, *rows)]
+    columns += ["steps of `_fk`", "of `_nearest`"]
+    lines = [f"| {' | '.join(row)} |" for row in (columns, ["---"] * 2 + ["--:"] * 9, *rows)]
     text = PAGE.read_text(encoding="utf-8")
     first, last = text.index(BEGIN) + len(BEGIN), text.index(END)
     PAGE.write_text("".join([text[:first], "\n", "\n".join(lines), "\n", text[last:]]), encoding="utf-8")

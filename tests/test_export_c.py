@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,7 @@ from pfabrik.errors import InvalidArgument, UnsupportedMechanism
 from pfabrik.exchange.export import source
 from pfabrik.exchange.export.export_c import PARTS, c_source
 from pfabrik.exchange.export.static_data import in_words
+from pfabrik.kernels.controller.reached import MOST_PARTS, SHORTEST_SHARE
 from pfabrik.machine.description.task import task_of
 from pfabrik.machine.files import dumps, loads
 
@@ -248,6 +250,19 @@ def test_a_self_test_fails_where_a_function_is_another(function: str, said: str)
     before = text[:place].replace(f"\n{head}\n{{", f"\nstatic {other}\n{{")
     code, words = checks_itself(compiled(f"{before}{caller}{text[place:]}", driver=None))
     assert code == 1 and said in words
+
+
+def test_the_most_parts_of_a_way_are_as_many_as_the_file_tells() -> None:
+    """Of all ways in which legs may close and not: each part twice as long as one that closes, half as long else."""
+
+    @cache
+    def most(way: float, share: float) -> int:
+        if way >= 1.0 or share < SHORTEST_SHARE:
+            return 0
+        return 1 + max(most(way + share, min(2.0 * share, 1.0 - way - share)), most(way, 0.5 * share))
+
+    assert most(0.0, 0.5) == MOST_PARTS
+    assert "pfk_ik takes at most 8 Newton steps" in text_of("delta")
 
 
 def slide(name: str = "J", **more: Any) -> pf.Mechanism:

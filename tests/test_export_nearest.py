@@ -73,26 +73,36 @@ class Said(NamedTuple):
     held: Array
     jumped: Array
     moved: Array
+    steps: Array
     actuators: Array
+    fk: Array
+    fk_steps: Array
 
 
-def said(
-    name: str, precision: str, targets: Array, *, steps: int = 200, starts: int = 24, warm: int = 0, machines: int = 1
-) -> Said:
-    """What a machine's file answers to targets, each from home, or from the answer before; of machines in turn."""
-    n_a = len(machine(name).actuator_names)
-    return said_by(program_of(name, precision), targets, n_a, steps, starts, warm, machines)
+def said(name: str, precision: str, targets: Array, **options: int) -> Said:
+    """What a machine's file answers to targets, as `said_by` asks it."""
+    return said_by(program_of(name, precision), targets, len(machine(name).actuator_names), **options)
 
 
 def said_by(
-    program: Path, targets: Array, n_a: int, steps: int = 200, starts: int = 24, warm: int = 0, machines: int = 1
+    program: Path,
+    targets: Array,
+    n_a: int,
+    *,
+    steps: int = 200,
+    starts: int = 24,
+    warm: int = 0,
+    machines: int = 1,
+    most: int = 0,
 ) -> Said:
-    """What a program answers of a machine with so many actuators."""
-    told, _ = asked(program, flat(targets), "nearest", steps, starts, warm, machines)
+    """What a program answers of a machine with so many actuators, from home or warm from the answer before.
+
+    With several machines their targets are in turn; with `most`, so many steps are taken for a target at most.
+    """
+    told, _ = asked(program, flat(targets), "nearest", steps, starts, warm, machines, most)
     assert told[:, 1].all()  # there are words for every code
-    codes, _, poses, holding, notes, actuators = np.split(told, [1, 2, 14, -3 - n_a, -n_a], axis=1)
-    held, jumped, moved = notes.T
-    return Said(codes[:, 0].astype(int), matrices(poses), holding > 0.0, held, jumped, moved, actuators)
+    codes, _, poses, holding, notes, actuators, fk = np.split(told, [1, 2, 14, -6 - n_a, -2 - n_a, -2], axis=1)
+    return Said(codes[:, 0].astype(int), matrices(poses), holding > 0.0, *notes.T, actuators, *fk.T)
 
 
 def statuses(told: Said) -> Array:
@@ -159,6 +169,25 @@ def test_what_is_commanded_is_reached_at_a_dead_point_too(name: str, precision: 
     again = answers_of(program_of(name, precision), mechanism, given)
     for codes in (again.limits, again.ik):
         assert (codes < LEG).all() and (codes == 0).mean() >= (1.0 if precision == "double" else 0.9)
+
+
+@needs_compiler
+@every_file
+def test_the_steps_of_a_call_have_a_bound_that_the_caller_sets(name: str, precision: str) -> None:
+    """Of all searches together, and of forward kinematics; one that is not met changes nothing."""
+    targets = known(name)[0]
+    free = said(name, precision, targets)
+    half = int(free.steps.max()) // 2
+    assert half > 1 and free.fk_steps.max() > 2
+    for one, other in zip(free, said(name, precision, targets, most=100_000), strict=True):
+        np.testing.assert_array_equal(one, other)
+    bound = said(name, precision, targets, most=half)
+    assert bound.steps.max() <= half and set(bound.codes) <= {0, PROJECTED, JUMPED, BUDGET} and BUDGET in bound.codes
+    short = said(name, precision, targets, most=2)
+    assert short.steps.max() <= 2 and short.fk_steps.max() <= 2
+    assert (short.fk[short.fk_steps == 2] != 0).any() and set(short.fk[short.fk_steps == 2]) <= {0, BUDGET}
+    feasible = pf.feasibility(machine(name), bound.poses).margin
+    assert np.min(feasible) >= (-1e-8 if precision == "double" else -1e-4)
 
 
 @needs_compiler

@@ -1,7 +1,9 @@
 /* Runs an exported file: see tests/exported.py.
        check                          its own test
-       nearest STEPS STARTS IS_WARM N the nearest poses to targets, each from home or from the one before, in turn of N
-                                      machines, each with its memory
+       nearest STEPS STARTS IS_WARM N MOST
+                                      the nearest poses to targets, each from home or from the one before, in turn of N
+                                      machines, each with its memory; at most MOST steps of all searches, and of forward
+                                      kinematics from home, whose code and steps follow
        hostile                        all functions, whatever they are given
        home, there                    all else; forward kinematics start there
    Numbers are read and written in double precision, whatever the file's. */
@@ -76,7 +78,7 @@ static void write_rates(const pfk_pose *pose)
 #endif
 
 #ifdef HAS_nearest
-static int find_nearest(int steps, int starts, int is_warm, int n)
+static int find_nearest(int steps, int starts, int is_warm, int n, int most)
 {
     static pfk_memory memories[2];
     pfk_pose target, poses[2], pose;
@@ -85,6 +87,7 @@ static int find_nearest(int steps, int starts, int is_warm, int n)
     int i, k, code;
     for (k = 0; k < 2; ++k) {
         pfk_begin(&memories[k]);
+        memories[k].most_steps = most;
         pfk_home(&poses[k]);
     }
     for (k = 0; read_pose(&target); k = (k + 1) % n) {
@@ -101,8 +104,12 @@ static int find_nearest(int steps, int starts, int is_warm, int n)
         write_code(memory->told.held);
         write_code(memory->told.jumped);
         write_numbers(&memory->told.moved, 1);
+        write_code(memory->told.steps);
         write_numbers(actuators, PFK_ACTUATORS);
         poses[k] = pose;
+        pfk_home(&pose);
+        write_code(pfk_fk(memory, actuators, &pose, &i));
+        write_code(i);
     }
     return 0;
 }
@@ -119,8 +126,8 @@ int main(int argc, char **argv)
     if (argc > 1 && !strcmp(argv[1], "hostile"))
         return hostile_all() != 0;
 #ifdef HAS_nearest
-    if (argc > 5 && !strcmp(argv[1], "nearest"))
-        return find_nearest(atoi(argv[2]), atoi(argv[3]), atoi(argv[4]), atoi(argv[5]));
+    if (argc > 6 && !strcmp(argv[1], "nearest"))
+        return find_nearest(atoi(argv[2]), atoi(argv[3]), atoi(argv[4]), atoi(argv[5]), atoi(argv[6]));
 #endif
     while (read_pose(&target) && read_pose(&whole) && read_numbers(given, PFK_ACTUATORS)) {
         pfk_home(&pose);

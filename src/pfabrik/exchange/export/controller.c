@@ -51,6 +51,7 @@ enum {
 typedef struct {
     int held;       /* of a target out of reach: 0 nothing, 1 its orientation, 2 its position; -1 if all is reached */
     int jumped;     /* 1 if no motion leads there from the last pose: drives jump */
+    int steps;      /* of all searches, each a linearisation of the machine; 0 where legs answer in closed form */
     int stretched;  /* the number of a leg at its dead point there, if `holding` is asked for; 0 if there is none */
     pfk_real moved; /* the largest move of a drive since the last answer, or home [L or rad] */
 } pfk_told;
@@ -78,8 +79,8 @@ int pfk_ik(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_real 
    hold a feasible pose, the last one or home: the search starts there, and it becomes the nearest, with its actuators;
    nothing is written where none is found. The search takes at most `steps` steps, a dozen mostly, from there and from
    each of up to `starts` more places, of PFK_STARTS; 0 in a control loop: less than `steps` x (`starts` + 2) together,
-   and as many again to tell if drives jump. `memory->told` says more of the answer. `holding`, which may be 0,
-   is filled with 1 for the limits, of PFK_LIMITS, that the pose is at: none where legs are stretched, at dead points. */
+   and as many again to tell if drives jump; or at most `memory->most_steps`. `memory->told` says more of the answer.
+   `holding`, which may be 0, is filled with 1 for the limits, of PFK_LIMITS, that the pose is at: none where legs are stretched, at dead points. */
 int pfk_nearest(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps, int starts,
                 char *holding);
 /* What a control loop calls: pfk_ik, and pfk_nearest where that has no answer. */
@@ -117,6 +118,7 @@ int pfk_effort(pfk_memory *memory, const pfk_pose *pose, const pfk_real twist[6]
 #endif
 #if FK
 /* The pose at given actuators, by Newton's method from `pose`; `steps` may be 0, or is set to the number of its steps.
+   Where it is led there in parts these may be hundreds: PFK_BUDGET is returned where `memory->most_steps` are spent.
    Limits are not checked. Nothing is written to `pose` unless 0, or PFK_OTHER_MODE, is returned. */
 #if CLEARANCE
 /* Where links are too near the pose is written too, and PFK_PAIR + the number of their pair returned. */
@@ -342,7 +344,7 @@ static void pfk_tell(pfk_memory *memory, const pfk_real actuators[PFK_ACTUATORS]
         return;
     memory->told.held = held;
     memory->told.jumped = jumped;
-    memory->told.stretched = 0;
+    memory->told.steps = memory->told.stretched = 0;
     memory->told.moved = 0.0;
     for (i = 0; i < PFK_ACTUATORS; ++i) {
         move = fabs(actuators[i] - memory->actuators[i]) / pfk_units[i];
@@ -380,12 +382,14 @@ int pfk_nearest(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_
     steps = steps < 1 ? 1 : (steps > 10000 ? 10000 : steps);
     code = (int)pfk_project_target(&memory->projecting, &memory->reaching,
                                    pfk_opened(target, memory->projecting_targets), pfk_opened(pose, own),
-                                   pfk_opened_row(actuators, PFK_ACTUATORS), steps, starts);
+                                   pfk_opened_row(actuators, PFK_ACTUATORS), steps, starts,
+                                   memory->most_steps > 0 ? memory->most_steps : 0);
     if (code == PFK_NO_POSE)
         return code;
     pfk_close(own, pose);
-    if (memory->projecting_held[0] > -2)
-        pfk_tell(memory, actuators, (int)memory->projecting_held[0], code == PFK_JUMPED);
+    if (memory->projecting_notes[0] > -2)
+        pfk_tell(memory, actuators, (int)memory->projecting_notes[0], code == PFK_JUMPED);
+    memory->told.steps = (int)memory->projecting_notes[1];
     for (i = 0; i < PFK_LIMITS && holding; ++i)
         holding[i] = 0;
     if (!holding || pfk_rest(&memory->reaching, pfk_opened(pose, own)) >= PFK_LEG)
@@ -472,8 +476,12 @@ int pfk_effort(pfk_memory *memory, const pfk_pose *pose, const pfk_real twist[6]
 int pfk_fk(pfk_memory *memory, const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
 {
     pfk_real own[16];
-    const int code = (int)pfk_assemble(&memory->assembling, &memory->reaching, pfk_opened_row(actuators, PFK_ACTUATORS),
-                                       pfk_opened(pose, own));
+    int code;
+    memory->assembling_scratch_steps[1] = memory->most_steps;
+    code = (int)pfk_assemble(&memory->assembling, &memory->reaching, pfk_opened_row(actuators, PFK_ACTUATORS),
+                             pfk_opened(pose, own));
+    if (code && memory->most_steps > 0 && memory->assembling_scratch_steps[0] >= memory->most_steps)
+        code = PFK_BUDGET;
     if (steps)
         *steps = (int)memory->assembling_scratch_steps[0];
     pfk_close(own, pose);
@@ -511,8 +519,12 @@ int pfk_to_actuators(pfk_memory *memory, const pfk_real joints[PFK_JOINTS], pfk_
 #if TO_JOINTS
 int pfk_to_joints(pfk_memory *memory, const pfk_real actuators[PFK_ACTUATORS], pfk_real *joints, int *steps)
 {
-    const int code = (int)pfk_put_joints(&memory->series, &memory->assembling, &memory->reaching,
-                                         pfk_opened_row(actuators, PFK_ACTUATORS), pfk_opened_row(joints, PFK_JOINTS));
+    int code;
+    memory->assembling_scratch_steps[1] = memory->most_steps;
+    code = (int)pfk_put_joints(&memory->series, &memory->assembling, &memory->reaching,
+                               pfk_opened_row(actuators, PFK_ACTUATORS), pfk_opened_row(joints, PFK_JOINTS));
+    if (code && memory->most_steps > 0 && memory->assembling_scratch_steps[0] >= memory->most_steps)
+        code = PFK_BUDGET;
     if (steps)
         *steps = (int)memory->assembling_scratch_steps[0];
     return code;

@@ -14,6 +14,8 @@ from ...common.arrays import Floats, Mask
 from ...configuration import configuration
 from ...feasibility import feasibility
 from ...ik import solve_ik
+from ...kernels.controller.reached import ATTEMPTS, MOST_PARTS
+from ...kernels.legs.leg_constants import MOST_STEPS, MOST_STEPS_IMPLICIT
 from ...kinematics import JointPath, generic_of
 from ...machine.description.mechanism import Mechanism
 from ...machine.poses import pose
@@ -184,8 +186,11 @@ def source(
         included["checks.h"] = "\n".join([*more, _checks_h(machine, checks, conditions, precision)])
     text = with_finite_results(selected(routines[routines.index("#ifndef") :], conditions))
     text = re.sub(r'^#include "(.*)"\n', lambda match: included[match[1]], text, flags=re.MULTILINE)
-    body = in_words(re.sub(r"\n{3,}", "\n\n", f"{_header(machine, made, parts, path)}\n{text}"), name, precision)
-    body = body.replace(f"{name.upper()}_MEMORY_", f"{name}_memory")
+    whole = f"{_header(machine, made, tables, parts, path)}\n{text}"
+    body = in_words(re.sub(r"\n{3,}", "\n\n", whole), name, precision)
+    body = body.replace(f"{name.upper()}_MEMORY_", f"{name}_memory").replace(
+        f"{name.upper()}_MOST_", "the `most_steps`"
+    )
     return body.replace("_SELF_TEST FILE -lm", f"_SELF_TEST {comment(file)} -lm", 1)
 
 
@@ -322,7 +327,22 @@ def _checks_h(machine: Machine, checks: Checks, conditions: set[str], precision:
     return "\n".join([*lines, *table("pfk_check pfk_checks[PFK_CHECKS]", rows)])
 
 
-def _header(machine: Machine, made: Translated, parts: Sequence[str], path: JointPath | None) -> str:
+def steps_in_words(machine: Machine, tables: ControllerTables, parts: Sequence[str]) -> Iterator[str]:
+    """The most Newton steps of calls, and what bounds them."""
+    if "ik" in parts and (machine.completes or machine.has_implicit_joints):
+        each = MOST_STEPS_IMPLICIT if machine.has_implicit_joints else MOST_STEPS
+        ways = len(tables.reaching.ways)
+        most = each * (1 if ways == 1 else ways // ATTEMPTS * (1 + (ATTEMPTS - 1) * MOST_PARTS))
+        yield f"pfk_ik takes at most {most:,} Newton steps, mostly less than six."
+    if tables.assembling is not None:
+        yield "pfk_fk takes mostly five Newton steps, and hundreds where it is led far in parts: `most_steps` in its"
+        yield "memory bounds them."
+    yield ""
+
+
+def _header(
+    machine: Machine, made: Translated, tables: ControllerTables, parts: Sequence[str], path: JointPath | None
+) -> str:
     """The comment at the top: conventions, actuators, limits and legs, and the notice."""
     mechanism, unit = machine.mechanism, machine.mechanism.length_unit
     lines = [
@@ -343,6 +363,7 @@ def _header(machine: Machine, made: Translated, parts: Sequence[str], path: Join
         "With PFK_SELF_TEST defined it is a program that checks itself:",
         "    cc -std=c99 -D PFK_SELF_TEST FILE -lm -o check && ./check",
         "",
+        *steps_in_words(machine, tables, parts),
         "actuator  joint                 home",
     ]
     for place, (name, driven) in enumerate(zip(mechanism.actuator_names, machine.driven, strict=True)):

@@ -97,7 +97,7 @@ def translated(tables: ControllerTables, conditions: set[str], precision: Precis
     read, members = fields_read(whole), "\n".join(data.members)
     types = {name: text for name, text in program.needed(members).items() if TYPE.match(text)}
     kernels = {name: text for name, text in program.needed(used).items() if name not in types}
-    told = 12 + (len(tables.reaching.near.driven) + 1) * (8 if precision == "double" else 4)
+    told = 20 + (len(tables.reaching.near.driven) + 1) * (8 if precision == "double" else 4)
     memory = f"{MEMORY}typedef struct {{\n{members}\n{TOLD}}} pfk_memory;\n"
     return Translated(
         OWN_INTEGER + _own_types(_prefixed(_without_unread("\n".join(types.values()), read) + memory, program)),
@@ -126,7 +126,7 @@ def _translation(program: Program, tables: ControllerTables, conditions: set[str
         ("TO_JOINTS", put_joints, (tables.series, assembling, reaching, row, row)),
         ("EFFORT", put_exerted, (tables.driving, reaching, matrix, row, row, row, row)),
         ("NEAREST", stretched_leg, (reaching.near, reaching.scratch)),
-        ("NEAREST", project_target, (tables.projecting, reaching, matrix, matrix, row, number, number)),
+        ("NEAREST", project_target, (tables.projecting, reaching, matrix, matrix, row, number, number, number)),
     ]
     names = []
     for condition, kernel, samples in calls:
@@ -299,6 +299,7 @@ typedef PFK_INTEGER pfk_integer;
 
 TOLD = """\
     pfk_real actuators[PFK_ACTUATORS]; /* of the last answer */
+    int most_steps; /* of all searches of a call of pfk_nearest, and of pfk_fk: for its owner to set; 0: no bound */
     pfk_told told;
 """
 

@@ -34,6 +34,9 @@ that what follows may go farther."""
 SHORTEST_SHARE = 1.0 / 32.0
 """The shortest step, as a share of the way."""
 
+MOST_PARTS = 66
+"""Most parts of a way of which the next is twice as long where legs close, and half as long where they do not."""
+
 UPRIGHT = 1e-6
 """Sine of the angle between a target's z axis and the only axis of tilt below which the target has no tilt."""
 
