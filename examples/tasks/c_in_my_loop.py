@@ -7,8 +7,8 @@ check it, and what to use in place of it when your loop is in Python.
 # ## One file of C
 #
 # `export_c` writes C99, a file and its header, that needs nothing but the C library's mathematics. It allocates no
-# memory: that of its calls is a `delta_memory` of yours. `precision="float"` suits microcontrollers without double precision. Every name in the
-# file begins with `name`.
+# memory: that of its calls is a `delta_memory` of yours, one for each machine. `precision="float"` suits
+# microcontrollers without double precision. Every name in the file begins with `name`.
 import shutil
 import subprocess
 from pathlib import Path
