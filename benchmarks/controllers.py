@@ -1,11 +1,12 @@
 """The exported C on controllers: bytes, stack, instructions, and its answers against the library's.
 
-python benchmarks/controllers.py [--targets 60] [NAME ...]
+python benchmarks/controllers.py [--targets 60] [--docs] [NAME ...]
 
 Bytes and stack are those of arm-none-eabi-gcc -Os for a Cortex-M4F in single precision; instructions those that
 qemu-system-arm counts, there and on a Cortex-M7 in double precision. Without these programs it says so, and compares
 what the C compiler here makes of the file with integers of 32 bits. It ends with 1 where a status differs, a pose is
-farther from its target than the library's by more than the tolerance, or no target was searched for. On Debian:
+farther from its target than the library's by more than the tolerance, or no target was searched for. With --docs it
+writes the table of docs/your-controller.md. On Debian:
 apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm
 """
 
@@ -65,9 +66,11 @@ int main(void)
 {
     unsigned k, i, j, counts[3];
     pfk_real a[PFK_ACTUATORS];
+    static pfk_memory memory;
+    pfk_begin(&memory);
     for (k = 0; k < sizeof targets / sizeof *targets; ++k) {
         pfk_pose target, pose, back;
-        int code, near = 0, fk = 0;
+        int code, near = 0, fk = 0, steps = 0;
         pfk_home(&pose);
         pfk_home(&back);
         for (i = 0; i < 3; ++i)
@@ -77,18 +80,19 @@ int main(void)
         for (i = 0; i < PFK_ACTUATORS; ++i)
             a[i] = 0;
         start();
-        code = pfk_ik(&target, &pose, a);
+        code = pfk_ik(&memory, &target, &pose, a);
         counts[0] = counted();
         if (code == 0) {
             start();
-            fk = pfk_fk(a, &back, 0);
+            fk = pfk_fk(&memory, a, &back, &steps);
             counts[1] = counted();
         } else {
             start();
-            near = pfk_nearest(&target, &pose, a, STEPS, STARTS, 0);
+            near = pfk_nearest(&memory, &target, &pose, a, STEPS, STARTS, 0);
             counts[2] = counted();
         }
-        printf("%d %d %d %u %u %u", code, fk, near, counts[0], counts[1], counts[2]);
+        printf("%d %d %d %u %u %u %d %d", code, fk, near, counts[0], counts[1], counts[2], steps,
+               near ? memory.told.steps : 0);
         for (i = 0; i < 3; ++i)
             printf(" %.9g %.9g %.9g %.9g", (double)pose.R[i][0], (double)pose.R[i][1], (double)pose.R[i][2],
                    (double)pose.p[i]);
@@ -128,6 +132,10 @@ SECTIONS {
 }
 """
 
+PAGE = Path(__file__).parents[1] / "docs" / "your-controller.md"
+BEGIN, END = "<!-- benchmarks/controllers.py --docs -->\n", "\n<!-- end -->"
+"""Where the table is in the page."""
+
 TICK = 40
 """Instructions a tick of the board's timer: 1 ns each by `-icount shift=0`, at 25 MHz."""
 
@@ -150,8 +158,9 @@ class Truth(NamedTuple):
 
 
 def size_of(text: str, folder: Path) -> Size:
-    """Bytes of a file on a Cortex-M4F; the stack is the deepest path of calls, without the C library's."""
-    (folder / "exported.c").write_text(text)
+    """Bytes of a file on a Cortex-M4F with one memory of calls; the stack is the deepest path of calls, without the C
+    library's."""
+    (folder / "exported.c").write_text(f"{text}\nextern pfk_memory pfk_of_a_caller;\npfk_memory pfk_of_a_caller;\n")
     command = [
         GCC,
         *C,
@@ -228,7 +237,7 @@ def told(
 def compared(machine: pf.Mechanism, known: Truth, said: Array) -> tuple[int, int, float]:
     """How many statuses differ from the library's, and how many nearest poses were found; how much farther [L]."""
     status = np.where(said[:, 0] == 0, 0, np.where(said[:, 2] == 0, 0, np.where(said[:, 2] == -4, 1, 9)))
-    poses = said[:, 6:].reshape(-1, 3, 4)
+    poses = said[:, 8:].reshape(-1, 3, 4)
     distance = [np.linalg.norm(each[:, :3, 3] - known.targets[:, :3, 3], axis=1) for each in (poses, known.poses)]
     both = (status == 1) & (known.status == 1)
     above = (distance[0] - distance[1])[both] / machine.characteristic_length
@@ -245,13 +254,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", default=["stewart", "delta"], help="machines of the catalogue")
     parser.add_argument("--targets", type=int, default=60)
+    parser.add_argument("--docs", action="store_true", help="write the table of docs/your-controller.md")
     parser.add_argument("--starts", type=int, default=99, help="places that searches start from beside the last answer")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
     has_gcc, has_qemu = shutil.which(GCC) is not None, shutil.which(QEMU) is not None
     if not has_gcc or not has_qemu:
         print(f"{'' if has_gcc else GCC} {'' if has_qemu else QEMU} not found: the C compiler here takes their place")
-    is_wrong = False
+    is_wrong, rows = False, []
     for name in given.names:
         machine = pf.load(name)
         known = truth_of(machine, given.targets)
@@ -260,6 +270,7 @@ def main() -> int:
             folder = Path(place)
             for part, parts in PARTS.items() if has_gcc else ():
                 size = size_of(c_source(machine, precision="float", parts=parts), folder)
+                rows.append([name, part, *(f"{bytes / 1000:.1f} kB" for bytes in size)])
                 print(
                     f"  M4F float {part:<10} code {size.code:6,}  constants {size.constants:6,}  RAM {size.memory:6,}"
                     f"  stack {size.stack:6,}"
@@ -268,12 +279,32 @@ def main() -> int:
                 said = told(machine, known, precision, folder, on_board=has_gcc and has_qemu, starts=given.starts)
                 differ, n_nearest, above = compared(machine, known, said)
                 is_wrong |= differ > 0 or n_nearest == 0 or above > TOLERANCE[precision]
+                if precision == "float" and rows:
+                    rows[-3] += [counts(said, 3), "", ""]
+                    rows[-2] += [counts(said, 3), counts(said, 4), ""]
+                    rows[-1] += [counts(said, column) for column in (3, 4, 5)]
+                    rows[-2] += [f"{said[:, 6].max():.0f}", ""]
+                    rows[-1] += [f"{said[:, column].max():.0f}" for column in (6, 7)]
+                    rows[-3] += ["", ""]
                 of = f"IK {counts(said, 3)}, FK {counts(said, 4)}, nearest {counts(said, 5)}"
+                most = f"most steps FK {said[:, 6].max():.0f}, nearest {said[:, 7].max():.0f}"
                 print(
                     f"  {precision:<6} statuses that differ {differ}, nearest {n_nearest}, farther by {above:.1e} L;"
-                    f" instructions {of}"
+                    f" instructions {of}; {most}"
                 )
+    if given.docs and has_gcc and has_qemu:
+        write_table(rows)
     return int(is_wrong)
+
+
+def write_table(rows: list[list[str]]) -> None:
+    """Put the table into its page."""
+    columns = ["machine", "parts", "code", "constants", "memory", "stack", "`_ik`", "`_fk`", "`_nearest`"]
+    columns += ["steps of `_fk`", "of `_nearest`"]
+    lines = [f"| {' | '.join(row)} |" for row in (columns, ["---"] * 2 + ["--:"] * 9, *rows)]
+    text = PAGE.read_text(encoding="utf-8")
+    first, last = text.index(BEGIN) + len(BEGIN), text.index(END)
+    PAGE.write_text("".join([text[:first], "\n", "\n".join(lines), "\n", text[last:]]), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -25,6 +25,8 @@ def argument_of(parameter: str, function: str, *, has_joints: bool) -> Argument:
     words = re.fullmatch(r"(const )?(\w+) (\*?)(\w+)((?:\[\w*\])*)", " ".join(parameter.split()))
     assert words is not None, parameter
     constant, kind, star, name, lengths = words.groups()
+    if kind == "pfk_memory":
+        return Argument("", f"&hostile_{name}")
     if kind in ("int", "char"):
         return Argument("", f"{'&' if kind == 'int' and star else ''}hostile_{name}")
     counts = re.findall(r"\w+", lengths) or [LENGTHS.get(name, "1") if kind == "pfk_real" else "1"]
@@ -48,4 +50,5 @@ def header(text: str) -> str:
         lines.append(f"static int {function}(void)\n{{\n    return pfk_{name}({given});\n}}\n")
         lines.append(f"static const hostile_argument {function}_arguments[] = {{{rows}}};\n")
         calls += f'    hostile_ask("{name}", {function}, {function}_arguments);\n'
-    return "".join([*lines, f"static int hostile_all(void)\n{{\n{calls}    return hostile_wrong;\n}}\n"])
+    body = f"    pfk_begin(&hostile_memory);\n{calls}    return hostile_wrong;\n"
+    return "".join([*lines, f"static int hostile_all(void)\n{{\n{body}}}\n"])

@@ -6,6 +6,7 @@ import dataclasses
 import re
 import shutil
 import subprocess
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,7 @@ from pfabrik.errors import InvalidArgument, UnsupportedMechanism
 from pfabrik.exchange.export import source
 from pfabrik.exchange.export.export_c import PARTS, c_source
 from pfabrik.exchange.export.static_data import in_words
+from pfabrik.kernels.controller.reached import MOST_PARTS, SHORTEST_SHARE
 from pfabrik.machine.description.task import task_of
 from pfabrik.machine.files import dumps, loads
 from test_actuation import waist
@@ -230,7 +232,39 @@ def test_a_file_checks_itself_with_poses_that_have_one_answer_alone(monkeypatch:
 def test_a_self_test_fails_where_the_machine_is_another() -> None:
     text, place = text_of("stewart"), "/* base_end_point */ {"
     code, words = checks_itself(compiled(text.replace(place, f"{place}1.0 + ", 1), driver=None))
-    assert code == 1 and "actuator 0" in words
+    assert code == 1 and "actuators of pose 0" in words and "torques 0" in words
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("function", "said"), [("nearest", "target out of reach 0"), ("fk", "back to pose"), ("torques", "torques 0")]
+)
+def test_a_self_test_fails_where_a_function_is_another(function: str, said: str) -> None:
+    """One whose first number is twice what it should be."""
+    text = text_of("stewart")
+    (head,) = re.findall(rf"^(int pfk_{function}\((?:[^()]*)\))\n\{{", text, re.MULTILINE)
+    name = {"nearest": "pose->p[0]", "fk": "pose->p[0]", "torques": "torques[0]"}[function]
+    given = ", ".join(re.findall(r"(\w+)(?:\[\w*\])?(?:,|\)$)", head.partition("(")[2]))
+    other = head.replace(f"pfk_{function}", f"pfk_other_{function}")
+    body = f"    const int code = pfk_other_{function}({given});\n    {name} *= 2.0;\n    return code;\n"
+    caller = f"{head}\n{{\n{body}}}\n"
+    place = text.index("#ifdef PFK_SELF_TEST\n")
+    before = text[:place].replace(f"\n{head}\n{{", f"\nstatic {other}\n{{")
+    code, words = checks_itself(compiled(f"{before}{caller}{text[place:]}", driver=None))
+    assert code == 1 and said in words
+
+
+def test_the_most_parts_of_a_way_are_as_many_as_the_file_tells() -> None:
+    """Of all ways in which legs may close and not: each part twice as long as one that closes, half as long else."""
+
+    @cache
+    def most(way: float, share: float) -> int:
+        if way >= 1.0 or share < SHORTEST_SHARE:
+            return 0
+        return 1 + max(most(way + share, min(2.0 * share, 1.0 - way - share)), most(way, 0.5 * share))
+
+    assert most(0.0, 0.5) == MOST_PARTS
+    assert "pfk_ik takes at most 8 Newton steps" in text_of("delta", "float")
 
 
 def slide(name: str = "J", **more: Any) -> pf.Mechanism:
@@ -294,9 +328,10 @@ def test_the_file_is_cpp_too_and_arms_that_follow_in_more_than_one_way_do_so_in_
 @pytest.mark.skipif(not COMPILERS or not all(map(shutil.which, ("g++", "nm"))), reason="no C, C++ and nm here")
 def test_a_program_in_cpp_calls_the_file_compiled_as_c_which_needs_mathematics_alone(folder: Path) -> None:
     (folder / "main.cpp").write_text(
-        '#define DELTA_DECLARATIONS_ONLY\n#include "delta.c"\n#include <cstdio>\n'
+        '#include "delta.h"\n#include <cstdio>\n'
         "int main() { delta_pose pose; double found[DELTA_ACTUATORS]; delta_home(&pose); pose.p[2] += 1.0;"
-        " delta_pose out = pose; if (delta_ik(&pose, &out, found)) return 1;"
+        " static delta_memory own; delta_begin(&own);"
+        " delta_pose out = pose; if (delta_ik(&own, &pose, &out, found)) return 1;"
         ' std::printf("%.12g %.12g %.12g", found[0], found[1], found[2]); }'
     )
     for command in (
@@ -307,10 +342,10 @@ def test_a_program_in_cpp_calls_the_file_compiled_as_c_which_needs_mathematics_a
     told = subprocess.run([str(folder / "main")], capture_output=True, text=True, check=True).stdout
     lifted = pf.solve_ik(machine("linear_delta"), machine("linear_delta").home_pose[:3, 3] + [0, 0, 1])
     np.testing.assert_allclose([float(word) for word in told.split()], lifted.actuators, rtol=1e-9)
-    # nothing but mathematics, no name that another file could see, and nothing written but memory of calls
+    # nothing but mathematics, no name that another file could see, and nothing static that is written
     listed = subprocess.run(["nm", "delta.o"], cwd=folder, capture_output=True, text=True, check=True).stdout
     symbols = [line.split()[-2:] for line in listed.splitlines()]
-    assert not [name for kind, name in symbols if kind in "BDC"]
+    assert not [name for kind, name in symbols if kind in "BDCb"]
     assert {name for kind, name in symbols if kind == "U"} <= MATHEMATICS
     assert all(name.startswith("delta_") for kind, name in symbols if kind in "Tbd")
 
@@ -334,7 +369,7 @@ def test_any_choice_of_parts_is_all_that_is_there_and_compiles_without_a_warning
     text = c_source(machine(name), parts=parts)
     assert {part for part, function in FUNCTIONS.items() if f"int pfk_{function}(" in text} == set(parts)
     (tmp_path / "exported.c").write_text(text)
-    command = [COMPILERS[0], "-std=c99", *STRICT, "-c", "exported.c", "-o", "exported.o"]
+    command = [COMPILERS[0], "-std=c99", "-O2", *STRICT, "-c", "exported.c", "-o", "exported.o"]
     assert subprocess.run(command, cwd=tmp_path, capture_output=True, text=True).stderr == ""
 
 

@@ -224,12 +224,12 @@ def test_the_file_measures_what_the_library_does_and_answers_where_links_are_apa
 @needs_compiler
 def test_the_self_test_compares_distances_and_finds_links_of_another_thickness() -> None:
     text = text_of("solids", "double")
-    rows = re.findall(r"^    \{\{\{.*, ([01]), (\S+)\},?$", text, re.MULTILINE)
+    rows = re.findall(r"^    \{\{\{.*, ([01]), [01], (\S+)\},?$", text, re.MULTILINE)
     assert len(rows) == 50 and {kept for kept, _ in rows} == {"0", "1"}
     assert any(float(distance) < machine("solids").clearance for _, distance in rows)
     wrong = re.sub(r"(pfk_reaching_links_sizes\[\d+\] = \{\s+\S+ )", r"\1 0.001 + ", text)  # of the first, all around
     code, words = checks_itself(compiled(wrong, driver=None))
-    assert code == 1 and ", links: " in words
+    assert code == 1 and "links at pose" in words
 
 
 def test_a_machine_without_a_clearance_is_exported_as_one_without_thickness() -> None:
@@ -276,7 +276,9 @@ JOINTS_DRIVER = """
 #include HOSTILE
 int main(int argc, char **argv)
 {
+    static pfk_memory memory;
     double q[PFK_JOINTS], rates[PFK_JOINTS] = {1.0, 2.0};
+    pfk_begin(&memory);
     if (argc > 1 && !strcmp(argv[1], "hostile"))
         return hostile_all() != 0;
     while (fread(q, sizeof(double), PFK_JOINTS, stdin) == PFK_JOINTS) {
@@ -285,9 +287,10 @@ int main(int argc, char **argv)
         int j;
         if (fread(given, sizeof(double), PFK_ACTUATORS, stdin) != PFK_ACTUATORS)
             return 1;
-        codes[0] = pfk_to_actuators(q, x);
-        codes[1] = pfk_to_joints(given, back, 0);
-        if (pfk_jacobian(q, J) || pfk_speeds(q, rates, speeds) || pfk_torques(q, rates, torques))
+        codes[0] = pfk_to_actuators(&memory, q, x);
+        codes[1] = pfk_to_joints(&memory, given, back, 0);
+        if (pfk_jacobian(&memory, q, J) || pfk_speeds(&memory, q, rates, speeds) ||
+            pfk_torques(&memory, q, rates, torques))
             return 1;
         for (j = 0; j < PFK_ACTUATORS; ++j)
             power += speeds[j] * torques[j];

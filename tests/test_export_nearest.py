@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
+from checks import actuator_units
 from exported import (
     CATALOGUE,
     KEEP,
+    Truth,
+    answers_of,
     asked,
     compiled,
     flat,
@@ -35,7 +38,7 @@ from pfabrik.machine.description.task import task_of
 from pfabrik.machine.model import model_of
 
 Array = np.ndarray
-PROJECTED, BUDGET, NO_POSE = -4, -5, -1
+PROJECTED, BUDGET, NO_POSE, JUMPED, LEG = -4, -5, -1, -11, 1000
 FARTHER = {"double": 1e-7, "float": 1e-3}
 """How much farther from its target than the library's a nearest pose may be [L]."""
 
@@ -67,18 +70,39 @@ class Said(NamedTuple):
     codes: Array
     poses: Array
     holding: Array
+    held: Array
+    jumped: Array
+    moved: Array
+    steps: Array
+    actuators: Array
+    fk: Array
+    fk_steps: Array
 
 
-def said(name: str, precision: str, targets: Array, *, steps: int = 200, starts: int = 24, warm: int = 0) -> Said:
-    """What a machine's file answers to targets, each from home, or from the answer before."""
-    return said_by(program_of(name, precision), targets, steps, starts, warm)
+def said(name: str, precision: str, targets: Array, **options: int) -> Said:
+    """What a machine's file answers to targets, as `said_by` asks it."""
+    return said_by(program_of(name, precision), targets, len(machine(name).actuator_names), **options)
 
 
-def said_by(program: Path, targets: Array, steps: int = 200, starts: int = 24, warm: int = 0) -> Said:
-    """What a program answers."""
-    told, _ = asked(program, flat(targets), "nearest", steps, starts, warm)
+def said_by(
+    program: Path,
+    targets: Array,
+    n_a: int,
+    *,
+    steps: int = 200,
+    starts: int = 24,
+    warm: int = 0,
+    machines: int = 1,
+    most: int = 0,
+) -> Said:
+    """What a program answers of a machine with so many actuators, from home or warm from the answer before.
+
+    With several machines their targets are in turn; with `most`, so many steps are taken for a target at most.
+    """
+    told, _ = asked(program, flat(targets), "nearest", steps, starts, warm, machines, most)
     assert told[:, 1].all()  # there are words for every code
-    return Said(told[:, 0].astype(int), matrices(told[:, 2:14]), told[:, 14:] > 0.0)
+    codes, _, poses, holding, notes, actuators, fk = np.split(told, [1, 2, 14, -6 - n_a, -2 - n_a, -2], axis=1)
+    return Said(codes[:, 0].astype(int), matrices(poses), holding > 0.0, *notes.T, actuators, *fk.T)
 
 
 def statuses(told: Said) -> Array:
@@ -122,13 +146,81 @@ def test_what_is_out_of_reach_is_answered_as_the_library_does(name: str, precisi
     assert len(limit_units(mechanism)) == holding.shape[1] == len(model_of(mechanism).legs.limits)
 
 
+def away_and_back(name: str, n: int) -> Array:
+    """Targets that leave the workspace and come back."""
+    mechanism = machine(name)
+    targets = np.repeat(mechanism.home_pose[None], n, axis=0)
+    targets[:, 0, 3] += 1.5 * mechanism.characteristic_length * np.sin(np.linspace(0.0, np.pi, n))
+    return targets
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("name", "precision"), [*FILES, ("g1_ankle", "double"), pytest.param("delta", "double", marks=pytest.mark.campaign)]
+)
+def test_what_is_commanded_is_reached_at_a_dead_point_too(name: str, precision: str) -> None:
+    """As the library reaches it; in single precision rounding may leave a few beyond a limit."""
+    mechanism, targets = machine(name), known(name)[0]
+    told = said(name, precision, targets)
+    out = np.isin(told.codes, (PROJECTED, JUMPED))
+    poses = told.poses[out]
+    assert (out.sum() > 5 and (pf.solve_ik(mechanism, poses, options=KEEP).status == 0).all()) or precision == "float"
+    given = Truth(poses, poses, out[out], told.actuators[out], np.zeros(0))
+    again = answers_of(program_of(name, precision), mechanism, given)
+    for codes in (again.limits, again.ik):
+        assert (codes < LEG).all() and (codes == 0).mean() >= (1.0 if precision == "double" else 0.9)
+
+
+@needs_compiler
+@every_file
+def test_the_steps_of_a_call_have_a_bound_that_the_caller_sets(name: str, precision: str) -> None:
+    """Of all searches together, and of forward kinematics; one that is not met changes nothing."""
+    targets = known(name)[0]
+    free = said(name, precision, targets)
+    half = int(free.steps.max()) // 2
+    assert half > 1 and free.fk_steps.max() > 2
+    for one, other in zip(free, said(name, precision, targets, most=100_000), strict=True):
+        np.testing.assert_array_equal(one, other)
+    bound = said(name, precision, targets, most=half)
+    assert bound.steps.max() <= half and set(bound.codes) <= {0, PROJECTED, JUMPED, BUDGET} and BUDGET in bound.codes
+    short = said(name, precision, targets, most=2)
+    assert short.steps.max() <= 2 and short.fk_steps.max() <= 2
+    assert (short.fk[short.fk_steps == 2] != 0).any() and set(short.fk[short.fk_steps == 2]) <= {0, BUDGET}
+    feasible = pf.feasibility(machine(name), bound.poses).margin
+    assert np.min(feasible) >= (-1e-8 if precision == "double" else -1e-4)
+
+
+@needs_compiler
+def test_two_machines_in_one_program_answer_as_each_by_itself() -> None:
+    """Bit by bit, whatever the other is asked between: nothing but the caller's memory is written."""
+    one, other = away_and_back("stewart", 60), known("stewart")[0][:40]
+    other = np.concatenate([other, other[:20]])
+    both = np.stack([one, other], axis=1).reshape(-1, 4, 4)
+    together = said("stewart", "double", both, starts=0, steps=40, warm=1, machines=2)
+    for k, targets in enumerate((one, other)):
+        alone = said("stewart", "double", targets, starts=0, steps=40, warm=1)
+        for mine, its in zip(alone, together, strict=True):
+            np.testing.assert_array_equal(mine, its[k::2])
+
+
+@needs_compiler
+@every_file
+def test_each_answer_tells_what_is_held_whether_it_jumped_and_how_far_drives_move(name: str, precision: str) -> None:
+    mechanism, targets = machine(name), away_and_back(name, 60)
+    told = said(name, precision, targets, starts=0, steps=40, warm=1)
+    is_out = told.codes != 0
+    assert is_out.any() and (told.held[~is_out] == -1).all() and (told.held[is_out] >= 0).all()
+    np.testing.assert_array_equal(told.jumped > 0, told.codes == JUMPED)
+    homes = np.array([drive.home for drive in mechanism.drives])
+    steps = np.diff(np.concatenate([homes[None], told.actuators]), axis=0) / actuator_units(mechanism)
+    np.testing.assert_allclose(told.moved, np.abs(steps).max(axis=1), atol=1e-12 if precision == "double" else 1e-5)
+
+
 @needs_compiler
 @pytest.mark.parametrize(("name", "precision"), [FILES[0], pytest.param(*LONG[1], marks=pytest.mark.campaign)])
 def test_a_loop_that_leaves_the_workspace_goes_on_and_comes_back(name: str, precision: str) -> None:
     mechanism = machine(name)
-    way = np.sin(np.linspace(0.0, np.pi, 200))
-    targets = np.repeat(mechanism.home_pose[None], len(way), axis=0)
-    targets[:, 0, 3] += 1.5 * mechanism.characteristic_length * way
+    targets = away_and_back(name, 200)
     told = said(name, precision, targets, starts=0, steps=40, warm=1)
     assert set(told.codes) == {0, PROJECTED}
     assert (told.codes[:3] == 0).all() and (told.codes[-3:] == 0).all() and told.codes[100] == PROJECTED
@@ -188,7 +280,7 @@ def test_every_machine_is_searched_and_survives_with_integers_of_32_bits(
         monkeypatch.setattr(source, "N_TRIED", 3)  # for the self-test, which is not of interest here
         program = compiled(c_source(machine(name), precision=precision))
     targets, found = known(name, 12)
-    told = said_by(program, targets)
+    told = said_by(program, targets, len(machine(name).actuator_names))
     np.testing.assert_array_equal(statuses(told), found.status)
     away = found.status == 1
     assert away.any() or name == "agile_eye"  # which turns about its centre, as far as these targets are

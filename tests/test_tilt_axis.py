@@ -94,12 +94,14 @@ def test_exported_c_measures_a_tilt_along_the_only_freedom(tmp_path: Path) -> No
     pf.export_c(machine, tmp_path / "machine.c", parts=("ik",))
     subprocess.run(["gcc", "-shared", "-fPIC", "machine.c", "-o", "machine.so", "-lm"], cwd=tmp_path, check=True)
     library, actuators = ctypes.CDLL(str(tmp_path / "machine.so")), (ctypes.c_double * 3)()
+    memory = (ctypes.c_double * 10_000)()
+    library.pfk_begin(memory)
     known = pf.solve_fk(machine, [0.05, -0.08, 0.1] + np.array([drive.home for drive in machine.drives]))
     for target in off_the_plane(
         np.repeat(known.pose[None], 5, axis=0), turn @ [0.0, 1.0, 0.0], np.random.default_rng(3)
     ):
         last = Pose.of(np.asarray(machine.home_pose))
-        assert library.pfk_ik(ctypes.byref(Pose.of(target)), ctypes.byref(last), actuators) == 0
+        assert library.pfk_ik(memory, ctypes.byref(Pose.of(target)), ctypes.byref(last), actuators) == 0
         assert np.array(actuators) == pytest.approx(known.actuators, abs=1e-9)
 
 

@@ -6,6 +6,7 @@ import copy
 import importlib.util
 import inspect
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -18,6 +19,7 @@ import pytest
 
 from pfabrik.kernels._jit import SOURCES
 from pfabrik.to_c import Program, Unsupported
+from pfabrik.to_c.types import Layout
 from subset import constructs
 from subset.random_programs import Writer
 
@@ -243,6 +245,64 @@ def test_integers_of_64_bits_hold_what_those_of_32_do_not(tmp_path: Path) -> Non
     made_of, program = imported(tmp_path / "refused.py", text), Program()
     program.add(made_of.refused, np.zeros(3))
     assert f"INT64_C({3 * 2**32 + 2**31 + 2**40})" in program.text()
+
+
+FACTS = """
+from typing import NamedTuple
+from typing import Any
+
+from pfabrik.kernels._jit import routine
+
+
+class Own(NamedTuple):
+    none: Any
+    some: Any
+    out: Any
+
+
+@routine
+def is_any(own: Own) -> bool:
+    return len(own.none) > 0 and own.some[0] > 1e9
+
+
+@routine
+def costly(own: Own, k: int) -> float:
+    return 17.0 * own.none[k]
+
+
+@routine
+def asked(own: Own) -> None:
+    wanted = own.some
+    for k in range(int(own.some[1])):
+        own.out[0] += costly(own, k)
+    if is_any(own):
+        own.out[1] = 18.0
+    if own.out[3] < 0.0:
+        own.out[2] = 19.0 if own.some[0] > 1e9 else own.none[0]
+    elif own.out[3] > 2.0 and own.none[3] > 20.0:
+        own.out[2] = 21.0
+    else:
+        own.out[2] = wanted[2] + len(wanted)
+"""
+
+
+def test_what_would_need_an_element_of_an_empty_array_is_left_out(tmp_path: Path) -> None:
+    """A loop over one, a branch that takes one, a call of what takes one; and lengths that are known are numbers."""
+    made_of = imported(tmp_path / "facts.py", FACTS)
+    own = made_of.Own(np.zeros(0), np.array([1.0, 0.0, 3.0]), np.zeros(4))
+    shapes = {("Own", name): array.shape for name, array in own._asdict().items()}
+    program = Program(facts={("Own", "none"): {0}}, layout=Layout(shapes=shapes))
+    made = program.add(made_of.asked, own)
+    text = program.text(f"int {made.name};\n")
+    assert program.fields_read(text) == {("Own", "some"), ("Own", "out")}
+    assert not re.search(r"costly|is_any|\b(17|18|20|21)\.0", text) and "19.0" in text
+    arrays = "".join(f"static double {name}[4] = {{1.0, 0.0, 3.0, 0.0}};\n" for name in ("none", "some", "out"))
+    given = f"({program.spell.value(made.arguments[0])}){{none, some, out}}"
+    main = f"{arrays}int main(void) {{ asked(&{given}); return (int)out[2]; }}\n"
+    (tmp_path / "facts.c").write_text(program.text(main))
+    command = [COMPILERS[0], *OPTIONS, *WARNINGS, str(tmp_path / "facts.c"), "-o", str(tmp_path / "facts"), "-lm"]
+    subprocess.run(command, check=True)
+    assert subprocess.run([str(tmp_path / "facts")], check=False).returncode == 6
 
 
 def test_elements_outside_an_array_are_found(tmp_path: Path) -> None:

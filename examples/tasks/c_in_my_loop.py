@@ -6,9 +6,9 @@ check it, and what to use in place of it when your loop is in Python.
 
 # ## One file of C
 #
-# `export_c` writes C99 that needs nothing but the C library's mathematics. It allocates no memory, and no answer
-# depends on an earlier call. `precision="float"` suits microcontrollers without double precision. Every name in the
-# file begins with `name`.
+# `export_c` writes C99, a file and its header, that needs nothing but the C library's mathematics. It allocates no
+# memory: that of its calls is a `delta_memory` of yours, one for each machine. `precision="float"` suits
+# microcontrollers without double precision. Every name in the file begins with `name`.
 import shutil
 import subprocess
 from pathlib import Path
@@ -22,7 +22,7 @@ machine = pf.load("delta")
 pf.export_c(machine, "delta.c", name="delta")
 
 # The functions that your loop calls:
-for line in Path("delta.c").read_text().splitlines():
+for line in Path("delta.h").read_text().splitlines():
     if line.startswith(("int delta_", "void delta_", "const char *delta_")) and line.endswith(";"):
         print(line)
 
@@ -33,8 +33,7 @@ for line in Path("delta.c").read_text().splitlines():
 # is at: the loop goes on, and comes back when the target does. It takes at most 40 steps here, and searches from the
 # last pose alone. (`delta_ik` writes nothing where the target is not reached, and names what is in the way.)
 Path("loop.c").write_text(r"""
-#define DELTA_DECLARATIONS_ONLY
-#include "delta.c"
+#include "delta.h"
 #include <stdio.h>
 
 int main(void)
@@ -43,10 +42,12 @@ int main(void)
     delta_pose pose, target;
     double motors[DELTA_ACTUATORS];
     char holding[DELTA_LIMITS];
+    static delta_memory memory;
+    delta_begin(&memory);
     delta_home(&pose);
     for (int k = 0; k < 4; k++) {
         delta_pose_rpy(20, 10, heights[k], 0, 0, 0, &target);
-        int code = delta_ik_or_nearest(&target, &pose, motors, 40, 0, holding);
+        int code = delta_ik_or_nearest(&memory, &target, &pose, motors, 40, 0, holding);
         printf("z %4.0f: motors %.4f %.4f %.4f rad, ", heights[k], motors[0], motors[1], motors[2]);
         printf("%s\n", delta_what(code));
         for (int limit = 0; limit < DELTA_LIMITS && code == DELTA_PROJECTED; limit++)

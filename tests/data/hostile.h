@@ -12,6 +12,7 @@ static const double hostile_numbers[] = {NAN,  INFINITY, -INFINITY, 1e200,  -1e2
 static const int hostile_counts[] = {0, -1, 1, 2147483647, -2147483647 - 1};
 static int hostile_steps, hostile_starts, hostile_pair, hostile_wrong;
 static char hostile_holding[PFK_LIMITS + 1];
+static pfk_memory hostile_memory;
 
 enum { HOSTILE_NUMBERS = sizeof hostile_numbers / sizeof *hostile_numbers, HOSTILE_COUNTS = 5, HOSTILE_DRAWS = 20 };
 

@@ -9,10 +9,12 @@ int main(int argc, char **argv)
 {
     double in[27];
     pfk_real twist[6], gain[6], gravity[3], effort[PFK_ACTUATORS];
+    static pfk_memory memory;
     pfk_pose pose;
     int i, code;
     if (argc > 1 && !strcmp(argv[1], "hostile"))
         return hostile_all() != 0;
+    pfk_begin(&memory);
     for (;;) {
         for (i = 0; i < 27; ++i)
             if (scanf("%lf", &in[i]) != 1)
@@ -27,7 +29,7 @@ int main(int argc, char **argv)
             gravity[i] = (pfk_real)in[24 + i];
         for (i = 0; i < PFK_ACTUATORS; ++i)
             effort[i] = 0.0;
-        code = pfk_effort(&pose, twist, gain, gravity, effort);
+        code = pfk_effort(&memory, &pose, twist, gain, gravity, effort);
         printf("%d", code);
         for (i = 0; i < PFK_ACTUATORS; ++i)
             printf(" %.17g", (double)effort[i]);

@@ -1,6 +1,9 @@
 /* Runs an exported file: see tests/exported.py.
        check                          its own test
-       nearest STEPS STARTS IS_WARM   the nearest poses to targets, each from home or from the one before
+       nearest STEPS STARTS IS_WARM N MOST
+                                      the nearest poses to targets, each from home or from the one before, in turn of N
+                                      machines, each with its memory; at most MOST steps of all searches, and of forward
+                                      kinematics from home, whose code and steps follow
        hostile                        all functions, whatever they are given
        home, there                    all else; forward kinematics start there
    Numbers are read and written in double precision, whatever the file's. */
@@ -13,6 +16,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include HOSTILE
+
+static pfk_memory its_memory, *const the_memory = &its_memory;
 
 static int read_numbers(pfk_real *numbers, int n)
 {
@@ -59,11 +64,11 @@ static void write_rates(const pfk_pose *pose)
     pfk_real J[PFK_ACTUATORS][6] = {{0}}, torques[PFK_ACTUATORS] = {0}, speeds[PFK_ACTUATORS] = {0};
     pfk_real wrench[6] = {0}, twist[6] = {0};
     int i;
-    write_code(pfk_jacobian(pose, J));
-    pfk_speeds(pose, w, speeds);
-    pfk_speeds_back(pose, speeds, twist);
-    pfk_torques(pose, w, torques);
-    pfk_torques_back(pose, torques, wrench);
+    write_code(pfk_jacobian(the_memory, pose, J));
+    pfk_speeds(the_memory, pose, w, speeds);
+    pfk_speeds_back(the_memory, pose, speeds, twist);
+    pfk_torques(the_memory, pose, w, torques);
+    pfk_torques_back(the_memory, pose, torques, wrench);
     for (i = 0; i < PFK_ACTUATORS; ++i)
         write_numbers(J[i], 6);
     write_numbers(torques, PFK_ACTUATORS);
@@ -73,22 +78,38 @@ static void write_rates(const pfk_pose *pose)
 #endif
 
 #ifdef HAS_nearest
-static int find_nearest(int steps, int starts, int is_warm)
+static int find_nearest(int steps, int starts, int is_warm, int n, int most)
 {
-    pfk_pose target, pose;
+    static pfk_memory memories[2];
+    pfk_pose target, poses[2], pose;
     pfk_real actuators[PFK_ACTUATORS] = {0};
     char holding[PFK_LIMITS + 1] = {0};
-    int i, code;
-    pfk_home(&pose);
-    while (read_pose(&target)) {
+    int i, k, code;
+    for (k = 0; k < 2; ++k) {
+        pfk_begin(&memories[k]);
+        memories[k].most_steps = most;
+        pfk_home(&poses[k]);
+    }
+    for (k = 0; read_pose(&target); k = (k + 1) % n) {
+        pfk_memory *const memory = &memories[k];
+        pose = poses[k];
         if (!is_warm)
             pfk_home(&pose);
-        code = pfk_ik_or_nearest(&target, &pose, actuators, steps, starts, holding);
+        code = pfk_ik_or_nearest(memory, &target, &pose, actuators, steps, starts, holding);
         write_code(code);
         write_code(strlen(pfk_what(code)) > 0);
         write_pose(&pose);
         for (i = 0; i < PFK_LIMITS; ++i)
             write_code(holding[i]);
+        write_code(memory->told.held);
+        write_code(memory->told.jumped);
+        write_numbers(&memory->told.moved, 1);
+        write_code(memory->told.steps);
+        write_numbers(actuators, PFK_ACTUATORS);
+        poses[k] = pose;
+        pfk_home(&pose);
+        write_code(pfk_fk(memory, actuators, &pose, &i));
+        write_code(i);
     }
     return 0;
 }
@@ -99,13 +120,14 @@ int main(int argc, char **argv)
     pfk_real actuators[PFK_ACTUATORS], given[PFK_ACTUATORS], slack[PFK_LIMITS + 1];
     pfk_pose target, whole, pose, back;
     int i, steps;
+    pfk_begin(the_memory);
     if (argc > 1 && !strcmp(argv[1], "check"))
         return pfk_checks_itself();
     if (argc > 1 && !strcmp(argv[1], "hostile"))
         return hostile_all() != 0;
 #ifdef HAS_nearest
-    if (argc > 4 && !strcmp(argv[1], "nearest"))
-        return find_nearest(atoi(argv[2]), atoi(argv[3]), atoi(argv[4]));
+    if (argc > 6 && !strcmp(argv[1], "nearest"))
+        return find_nearest(atoi(argv[2]), atoi(argv[3]), atoi(argv[4]), atoi(argv[5]), atoi(argv[6]));
 #endif
     while (read_pose(&target) && read_pose(&whole) && read_numbers(given, PFK_ACTUATORS)) {
         pfk_home(&pose);
@@ -117,9 +139,9 @@ int main(int argc, char **argv)
         for (i = 0; i < PFK_LIMITS; ++i)
             slack[i] = 0;
         steps = 0;
-        write_code(pfk_ik(&target, &pose, actuators));
-        write_code(pfk_limits(&whole, slack));
-        write_code(pfk_fk(given, &back, &steps));
+        write_code(pfk_ik(the_memory, &target, &pose, actuators));
+        write_code(pfk_limits(the_memory, &whole, slack));
+        write_code(pfk_fk(the_memory, given, &back, &steps));
         write_code(steps);
         write_pose(&pose);
         write_pose(&back);
@@ -132,7 +154,7 @@ int main(int argc, char **argv)
         {
             pfk_real distance = 0;
             int pair = 0;
-            write_code(pfk_clearance(&target, &distance, &pair));
+            write_code(pfk_clearance(the_memory, &target, &distance, &pair));
             write_numbers(&distance, 1);
             write_code(pair);
             fprintf(stderr, "%s\n", pfk_what(PFK_PAIR + pair));

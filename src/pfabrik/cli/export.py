@@ -112,7 +112,7 @@ def export(
     FORMAT is one of:
 
     \b
-    c         one file of C99: inverse and forward kinematics, Jacobians and torques, with every limit
+    c         C99, a file and its header: inverse and forward kinematics, Jacobians and torques, with every limit
     c-float   the same in single precision
     mjcf      a MuJoCo model, which starts closed; what weighs and drives it is made up
     linuxcnc  HAL lines where LinuxCNC has these kinematics, else a module in C for halcompile
@@ -123,6 +123,8 @@ def export(
     In place of it, files that need nothing of pfabrik: --torch, --jax, --numpy, --web, --ros2-control,
     --ros2-node.
     """
+    from ..exchange.export.export_c import header_of, in_two
+
     outputs = {form: path for form in FILES if (path := files[form]) is not None}
     packages = [option for option, path in (("--ros2-control", folder), ("--ros2-node", node)) if path is not None]
     if words and not (outputs or packages):
@@ -141,13 +143,19 @@ def export(
     _check_settings([*outputs, *packages], name, joints)
     if parts and not outputs.keys() & {*NAMED}:
         raise click.UsageError(f"--parts is of {', '.join(NAMED)}")
-    for path in outputs.values():
+    for form, path in outputs.items():
         refuse_existing(path, force)
+        if form in NAMED and path != STANDARD:
+            refuse_existing(header_of(path), force)
     check_outputs([(f"--{form}" if form in FILES else "-o", path) for form, path in outputs.items()], [Path(mech)])
     mechanism = load(mech)
     for form, path in outputs.items():
         file = "FILE" if path == STANDARD else path.name
-        _write(path, form, text_of(mechanism, form, "pfk" if name is None else name, joints or None, file, parts))
+        text = text_of(mechanism, form, "pfk" if name is None else name, joints or None, file, parts)
+        if form in NAMED and path != STANDARD:
+            declarations, text = in_two(text, header_of(path).name)
+            _write(header_of(path), form, declarations)
+        _write(path, form, text)
     if folder is not None:
         from ..exchange.export.ros2_control import ros2_control_texts
 

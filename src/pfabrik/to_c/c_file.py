@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..kernels._jit import SOURCES
-from .types import INTEGER, REAL, Array, Spelling, Struct, Unsupported, type_of
+from .types import INTEGER, REAL, Array, Layout, Spelling, Struct, Unsupported, type_of
 from .values import RESERVED, Value, number
 
 PRELUDE = Path(__file__).with_name("prelude.h")
@@ -27,24 +27,28 @@ class File:
         integer: str,
         facts: dict[tuple[str, str], set[int]] | None,
         tolerances: dict[tuple[str, str], float] | None,
+        layout: Layout,
     ) -> None:
         self.real, self.integer, self.facts, self.tolerances = real, integer, facts or {}, tolerances or {}
         self.suffix = "f" if real == "float" else ""
         self.bits = int(re.sub(r"\D", "", integer))  # that an integer has at least
         self.records = named_records()
         self.items: dict[str, str] = {}  # C text by the name that it declares
-        self.spell = Spelling(self._declare)
+        self.layout = layout
+        self.given: dict[tuple[Any, str], set[Any]] = {}  # shapes of arrays that functions are given, by parameter
+        self.of_other_shapes: set[tuple[str, str]] = set()  # where functions make an array otherwise
+        self.spell = Spelling(self._declare, layout)
         self._constants: dict[str, Any] = {}
         prelude = PRELUDE.read_text(encoding="utf-8").replace("REAL", real).replace("INTEGER", integer)
         if self.suffix:
             prelude = re.sub(r"\b(fabs|sqrt)\(", r"\1f(", prelude)
-        self._head: list[str] = []
+        self.head: list[str] = []
         for chunk in prelude.split("\n\n"):
             name = re.match(r"(?:/\*.*\*/\n)?static inline \w+ (\w+)\(", chunk)
             if name:
                 self.items[name[1]] = f"{chunk.rstrip()}\n"
             else:
-                self._head.append(f"{chunk.rstrip()}\n")
+                self.head.append(f"{chunk.rstrip()}\n")
 
     def _declare(self, name: str, text: str) -> None:
         self.items[name] = text

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from .expressions import ANNOTATED
+from .flow import flow_of
 from .subscripts import Subscripts
-from .types import BOOL, INTEGER, NUMBERS, REAL, WIDE, Array, Struct, Tuple, element_of, join
+from .types import BOOL, INTEGER, NUMBERS, REAL, WIDE, Array, Struct, Tuple, Unreachable, element_of, join
 from .values import UNARY, Value, effects, is_simple, opened_by, source_of, tree_of
 
 MATH = frozenset(
@@ -58,12 +59,26 @@ class Calls(Subscripts):
         for v, a in zip(values, takes, strict=True):
             declared = ANNOTATED.get(ast.unparse(a.annotation) if a.annotation else "")
             given.append(self.cast(v, declared, node) if declared and v.type in NUMBERS else self.addressed(v))
-        made = self.program.instance(called, tuple(v.type for v in given))
+        stays, kinds = flow_of(source.function).parameters_that_stay, [v.type for v in given]
+        for k, (v, a) in enumerate(zip(given, takes, strict=True)):
+            key, shape = (source.function, a.arg), v.inner[1] if v.inner else None
+            if isinstance(v.type, Array) and a.arg in stays:
+                self.program.given.setdefault(key, set()).add(shape)
+                if self.program.layout.shapes and shape is not None and key not in self.program.layout.views:
+                    kinds[k] = Array(v.type.element, v.type.ndim, shape=shape)
+        made = self.program.instance(called, tuple(kinds))
+        if made.is_unreachable:
+            raise Unreachable
         more = effects(given)
         self.reads |= made.reads
         self.writes |= made.writes
         self.allocates |= made.allocates
-        texts = [*(["memory"] if made.allocates else []), *(self.as_view(v).text for v in given)]
+        if made.is_constant and not more["writes"]:
+            return Value(self.program.literal(made.results[0], made.gives), made.gives, UNARY, made.results[0])
+        texts = [
+            *(["memory"] if made.allocates else []),
+            *(self.given(v, t) for v, t in zip(given, kinds, strict=True)),
+        ]
         text = f"{made.name}({', '.join(texts)})"
         return Value(
             text,
@@ -72,6 +87,11 @@ class Calls(Subscripts):
             writes=more["writes"] | made.writes,
             is_held=isinstance(made.gives, Struct),
         )
+
+    def given(self, v: Value, t: Any) -> str:
+        """An argument of a function."""
+        is_pointer = v.inner and isinstance(t, Array) and t.shape is not None
+        return v.inner[0] if v.inner and is_pointer else self.as_view(v).text
 
     def constructed(self, node: ast.Call, cls: Any) -> Value:
         """A new NamedTuple."""
@@ -83,9 +103,16 @@ class Calls(Subscripts):
         if any(v.type is None for v in values):
             return Value("0", None, **effects(values))
         pairs = zip(values, wants, strict=True)
-        values = [self.cast(v, w, node) if v.type in NUMBERS else self.as_view(v) for v, w in pairs]
-        t = Struct(cls, tuple(v.type for v in values))
-        text = f"({self.program.spell.value(t)}){{{', '.join(map(self.stored, values))}}}"
+        values = [self.cast(v, w, node) if v.type in NUMBERS else v for v, w in pairs]
+        t, given = Struct(cls, tuple(v.type for v in values)), []
+        for field in self.program.spell.members(cls):
+            v, shape = values[cls._fields.index(field)], self.program.layout.shapes.get((cls.__name__, field))
+            if (cls.__name__, field) in self.program.layout.constant:
+                raise self.fault(node, f"{field}, which is constant elsewhere")
+            if shape is not None and (v.inner is None or v.inner[1] != shape):
+                self.program.of_other_shapes.add((cls.__name__, field))
+            given.append(self.stored(v) if shape is None or v.inner is None else v.inner[0])
+        text = f"({self.program.spell.value(t)}){{{', '.join(given) or '0'}}}"
         return Value(text, t, is_held=True, **effects(values))
 
     def allocated(self, node: ast.Call, how: str) -> Value:

@@ -35,6 +35,9 @@ class Expressions:
         self.reads: frozenset[str] = NONE
         self.writes: frozenset[str] = NONE
         self.allocates = False
+        self.fields: set[tuple[str, str]] = set()  # of NamedTuples, that are read
+        self.constants: dict[str, int] = {}  # values of variables that have one alone
+        self.shapes: dict[str, tuple[int, ...] | None] = {}  # of variables that are arrays, where they are known
         self._before = Value("", None)  # what lines that were put before an expression read and write
 
     # ---- lines ----
@@ -108,6 +111,7 @@ class Expressions:
             kind = self.program.spell.variable(t).strip()
             return Value(f"({kind}){v.at(UNARY)}", t, UNARY, constant, **more)
         if isinstance(v.type, Array) and isinstance(t, Array) and join(v.type, t) is not None:
+            v = self.as_view(v)
             v = v if is_simple(v.text) else self.keep(v)
             counts = ", ".join(f"{v.text}.n[{k}]" for k in range(t.ndim))
             return Value(f"({self.program.spell.value(t)}){{{v.text}.data, {{{counts}}}}}", t)
@@ -169,7 +173,8 @@ class Expressions:
             t, own = self.types.get(name), c_name(name)
             if name in self.by_value:
                 return Value(f"&{own}", t, UNARY)
-            return Value(own, t, is_lasting=True)
+            shape, constant = self.shapes.get(name), self.constants.get(name, UNKNOWN)
+            return Value(own, t, constant=constant, is_lasting=True, inner=None if shape is None else (own, shape))
         return self.program.constant(name, self.global_of(node), self.globals["__name__"])
 
     def global_of(self, node: ast.expr) -> Any:
@@ -201,10 +206,15 @@ class Expressions:
             return Value("0", None)
         if isinstance(owner.type, Struct) and node.attr in owner.type.cls._fields:
             t = owner.type.items[owner.type.cls._fields.index(node.attr)]
+            self.fields.add((owner.type.cls.__name__, node.attr))
             text, more = f"{self.path_of(owner)}{c_name(node.attr)}", effects([owner])
+            if (owner.type.cls.__name__, node.attr) in self.program.layout.constant:
+                return Value(text, t, is_lasting=True, **more)
             if isinstance(t, Struct):
                 return Value(f"&{text}", t, UNARY, is_lasting=owner.is_lasting, **more)
-            return Value(text, t, possible=self.fact(owner.type.cls.__name__, node.attr), **more)
+            shape = self.program.layout.shapes.get((owner.type.cls.__name__, node.attr))
+            inner = None if shape is None else (text, shape)
+            return Value(text, t, possible=self.fact(owner.type.cls.__name__, node.attr), inner=inner, **more)
         if isinstance(owner.type, Array) and node.attr == "shape":
             lengths = [self.length(owner, k) for k in range(owner.type.ndim)]
             return self.tuple_of(lengths, Tuple((INTEGER,) * len(lengths)))
@@ -236,7 +246,7 @@ class Expressions:
         return self.known(Value(f"{v.text}.n[{k}]", INTEGER, possible=v.possible if k == 0 else None))
 
     def as_view(self, v: Value) -> Value:
-        """An array of a record as any other."""
+        """An array of known shape, as one of a record is, as any other."""
         if not v.inner:
             return v
         path, shape = v.inner

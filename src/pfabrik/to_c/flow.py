@@ -90,6 +90,10 @@ class Flow:
             self.homes[name] = self._home(name, function.body)
         self.rising: set[str] = set()  # counters from a constant on, never negative
         self.counters = self._counters(function)
+        stores = [n.id for n in ast.walk(body) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+        counting = {name for s in ast.walk(body) if isinstance(s, ast.For) for name in names_in(s.target)}
+        self.parameters_that_stay = self.arguments - set(stores) - counting
+        self.once = {name for name in self.local - self.arguments - counting if stores.count(name) == 1}  # set once
 
     def _home(self, name: str, block: Sequence[ast.stmt]) -> ast.stmt:
         """The first statement of the innermost block that has all of a name."""

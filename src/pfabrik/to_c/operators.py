@@ -8,7 +8,7 @@ from typing import Any
 
 from .c_file import SMALL
 from .expressions import Expressions
-from .types import BOOL, INTEGER, NUMBERS, REAL, Struct, Tuple, join
+from .types import BOOL, INTEGER, NUMBERS, REAL, Struct, Tuple, Unreachable, join
 from .values import (
     AND,
     BIT_AND,
@@ -68,8 +68,13 @@ class Operators(Expressions):
 
     def perhaps(self, node: ast.expr, want: Any = None, *, is_truth: bool = False) -> Value:
         """An expression that may not be evaluated: nothing can be computed before it."""
-        n = len(self.lines)
-        value = self.truth(node) if is_truth else self.expression(node, want)
+        n, noted = len(self.lines), set(self.fields)
+        try:
+            value = self.truth(node) if is_truth else self.expression(node, want)
+        except Unreachable:
+            self.fields = noted
+            del self.lines[n:]
+            raise
         if len(self.lines) > n:
             raise self.fault(node, "must be computed before an expression in which it may not be evaluated")
         return value
@@ -111,7 +116,10 @@ class Operators(Expressions):
         for each in node.values[1:]:
             if values[-1].is_constant and bool(values[-1].constant) is absorbing:
                 break
-            values.append(self.perhaps(each, is_truth=is_truth))
+            try:
+                values.append(self.perhaps(each, is_truth=is_truth))
+            except Unreachable:  # what is before it settles the whole
+                values.append(self.boolean(absorbing))
         if any(v.type not in (BOOL, None) for v in values):
             raise self.fault(node, "`and` or `or` of what is not a truth value")
         if values[-1].is_constant and bool(values[-1].constant) is absorbing and not any(v.writes for v in values):
@@ -179,7 +187,14 @@ class Operators(Expressions):
         test = self.truth(node.test)
         if test.is_constant and not test.writes:
             return self.expression(node.body if test.constant else node.orelse, want)
-        a, b = self.perhaps(node.body, want), self.perhaps(node.orelse, want)
+        try:
+            a = self.perhaps(node.body, want)
+        except Unreachable:
+            return self.expression(node.orelse, want)
+        try:
+            b = self.perhaps(node.orelse, want)
+        except Unreachable:
+            return a
         t = join(a.type, b.type)
         if t is None and a.type is not None and b.type is not None:
             raise self.fault(node, "a choice of values of different types")

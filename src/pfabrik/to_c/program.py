@@ -11,8 +11,8 @@ from .c_file import File
 from .expressions import ANNOTATED
 from .flow import flow_of
 from .statements import Statements
-from .types import NOTHING, Unsupported
-from .values import RESERVED, c_name, comment, comments_of, short_path, source_of, tree_of
+from .types import NOTHING, NUMBERS, Array, Layout, Unreachable, Unsupported
+from .values import RESERVED, UNKNOWN, c_name, comment, comments_of, short_path, source_of, tree_of
 
 INDENTED: Any = {"initial_indent": "    ", "subsequent_indent": "    "}
 
@@ -34,6 +34,7 @@ class Function(Statements):
         self.gives: Any = None
         self.types: dict[str, Any] = {}
         self.by_value: set[str] = set()
+        self.is_unreachable = False  # whatever calls it never happens
 
     def translate(self) -> None:
         """Fill the lines of the body."""
@@ -49,20 +50,36 @@ class Function(Statements):
             raise self.refused(node.lineno, f"{node.name}: perhaps read before it is assigned: {names}")
         self.parameters = [a.arg for a in takes.args]
         self.types = dict(zip(self.parameters, self.arguments, strict=True))
+        for parameter, t in self.types.items():
+            if isinstance(t, Array) and t.shape is not None:
+                self.types[parameter], self.shapes[parameter] = Array(t.element, t.ndim), t.shape
         declared = ast.unparse(node.returns) if node.returns else ""
         self.gives = {"None": NOTHING, **ANNOTATED}.get(declared)
         for _ in range(MOST_PASSES):
             before = self._settled()
             self.lines, self.indent, self.n_temporaries, self._last = [], 1, 0, node.body[0].lineno - 1
-            self._declared = set(self.parameters)
-            self.block(node.body[1:] if isinstance(node.body[0], ast.Expr) and ast.get_docstring(node) else node.body)
+            self._declared, self.results, self.fields, self.constants = set(self.parameters), [], set(), {}
+            try:
+                self.block(
+                    node.body[1:] if isinstance(node.body[0], ast.Expr) and ast.get_docstring(node) else node.body
+                )
+            except Unreachable:
+                self.is_unreachable = True
+                return
             self.gives = self.gives or NOTHING
             if before == self._settled():
                 return
         raise self.refused(node.lineno, f"{node.name}: its types do not settle")
 
     def _settled(self) -> Any:
-        return dict(self.types), self.gives, self.reads, self.writes, self.allocates, set(self.by_value)
+        kinds = dict(self.types), dict(self.shapes), set(self.by_value)
+        return kinds, self.gives, self.reads, self.writes, self.allocates
+
+    @property
+    def is_constant(self) -> bool:
+        """True if the result is the same number whatever the facts leave open, and computing it changes nothing."""
+        known = self.gives in NUMBERS and UNKNOWN not in self.results and not self.writes and not self.allocates
+        return known and all(repr(each) == repr(self.results[0]) for each in self.results)
 
     def refused(self, line: int, what: str) -> Unsupported:
         return Unsupported(f"{self.path}:{line}: {what}")
@@ -70,7 +87,8 @@ class Function(Statements):
     def text(self) -> str:
         """The function as C text."""
         spell = self.program.spell
-        takes = [f"{spell.variable(self.types[name])}{c_name(name)}" for name in self.parameters]
+        kinds = zip(self.arguments, self.parameters, strict=True)
+        takes = [f"{spell.variable(t)}{c_name(name)}" for t, name in kinds]
         if self.allocates:
             takes.insert(0, "arena *memory")
         gives = spell.stored(self.gives)
@@ -95,6 +113,8 @@ class Program(File):
     facts : what is known of the tables that the code is for: values of an integer field, by the names of its record and
         of itself, or lengths of an array, by its NamedTuple and its field. Code that no value reaches is left out.
     tolerances : values of constants that single precision needs, by module, without the package, and name.
+    layout : of the structs of NamedTuples. Where functions make one with an array of another shape than `shapes` has,
+        `of_other_shapes` names the field, and the text is of no use.
     """
 
     def __init__(
@@ -103,8 +123,9 @@ class Program(File):
         integer: str = "int64_t",
         facts: dict[tuple[str, str], set[int]] | None = None,
         tolerances: dict[tuple[str, str], float] | None = None,
+        layout: Layout = Layout(),  # noqa: B008 - it has no state
     ) -> None:
-        super().__init__(real, integer, facts, tolerances)
+        super().__init__(real, integer, facts, tolerances, layout)
         self.functions: dict[Any, Function] = {}
         self._active: list[Any] = []
 
@@ -126,8 +147,9 @@ class Program(File):
                 made.translate()
             finally:
                 self._active.pop()
-            made.name = self._name_for(source.function)
-            self.items[made.name] = made.text()
+            if not made.is_unreachable:
+                made.name = self._name_for(source.function)
+                self.items[made.name] = made.text()
             self.functions[key] = made
         return self.functions[key]
 
@@ -136,16 +158,27 @@ class Program(File):
         names = [plain, f"{module}_{plain}", *(f"{plain}_{k}" for k in range(2, 99))]
         return next(name for name in names if name not in self.items and name not in RESERVED)
 
+    def fields_read(self, text: str) -> frozenset[tuple[str, str]]:
+        """Fields of NamedTuples, by their classes, that the functions in C text read."""
+        wanted = words(text)
+        return frozenset[tuple[str, str]]().union(
+            *(made.fields for made in self.functions.values() if made.name in wanted)
+        )
+
     def text(self, more: str = "") -> str:
         """The C text: what its functions need, in order, and then what is given, whose names are needed too."""
-        wanted, kept = words(more), []
-        if not more:
+        return "\n".join([*self.head, *self.needed(more).values(), more])
+
+    def needed(self, text: str) -> dict[str, str]:
+        """What C text needs, in order, by the names that are declared; all functions if there is none."""
+        wanted, kept = words(text), {}
+        if not text:
             wanted |= {made.name for made in self.functions.values()}
-        for name, text in reversed(self.items.items()):  # each was declared after what it needs
+        for name, declared in reversed(self.items.items()):  # each was declared after what it needs
             if name in wanted:
-                kept.append(text)
-                wanted |= words(text)
-        return "\n".join([*self._head, *reversed(kept), more])
+                kept[name] = declared
+                wanted |= words(declared)
+        return dict(reversed(kept.items()))
 
 
 def words(text: str) -> set[str]:

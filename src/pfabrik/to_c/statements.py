@@ -10,10 +10,11 @@ from .calls import Calls
 from .expressions import ANNOTATED
 from .flow import is_range, names_in
 from .operators import OPERATORS
-from .types import BOOL, INTEGER, NOTHING, NUMBERS, REAL, Struct, Tuple, join
+from .types import BOOL, INTEGER, NOTHING, NUMBERS, REAL, Array, Struct, Tuple, Unreachable, join
 from .values import CONDITION, ORDER, POSTFIX, UNARY, Value, c_name, comment, conflict, is_simple
 
 WITH_BLOCKS = (ast.For, ast.While, ast.If)
+LEAVING = (ast.Return, ast.Break, ast.Continue)
 
 
 class Statements(Calls):
@@ -27,19 +28,40 @@ class Statements(Calls):
         super().__init__()
         self._last = 0  # last line whose comments are written
         self._declared: set[str] = set()
+        self.results: list[Any] = []  # constants that are returned, UNKNOWN for any other value
 
     def block(self, statements: list[ast.stmt]) -> None:
-        for s in statements:
-            self._write_notes(s)
-            is_whole = isinstance(s, WITH_BLOCKS)
-            if is_whole or isinstance(s, ast.AugAssign):
-                for name in self.flow.at_home(s):
-                    self._declare(name)
-            n = len(self.lines)
-            getattr(self, f"do_{type(s).__name__}", self._unknown)(s)
-            note = self.comments.get(s.lineno if is_whole else s.end_lineno or s.lineno)
-            if note and not note[1] and not is_whole and len(self.lines) > n:
-                self.lines[-1] += f" {comment(note[0]).strip()}"
+        first, before = len(self.lines), self._noted()
+        for place, s in enumerate(statements):
+            begin, noted = len(self.lines), self._noted()
+            try:
+                self._write(s)
+            except Unreachable:
+                if not any(isinstance(part, LEAVING) for each in statements[:place] for part in ast.walk(each)):
+                    self._forget(first, before)
+                    raise
+                self._forget(begin, noted)
+                return
+
+    def _noted(self) -> tuple[Any, ...]:
+        return set(self.fields), self.reads, self.writes, self.allocates, list(self.results), set(self._declared)
+
+    def _forget(self, line: int, noted: tuple[Any, ...]) -> None:
+        """Undo what was written from a line on, and what was noted of it."""
+        del self.lines[line:]
+        self.fields, self.reads, self.writes, self.allocates, self.results, self._declared = noted
+
+    def _write(self, s: ast.stmt) -> None:
+        self._write_notes(s)
+        is_whole = isinstance(s, WITH_BLOCKS)
+        if is_whole or isinstance(s, ast.AugAssign):
+            for name in self.flow.at_home(s):
+                self._declare(name)
+        n = len(self.lines)
+        getattr(self, f"do_{type(s).__name__}", self._unknown)(s)
+        note = self.comments.get(s.lineno if is_whole else s.end_lineno or s.lineno)
+        if note and not note[1] and not is_whole and len(self.lines) > n:
+            self.lines[-1] += f" {comment(note[0]).strip()}"
 
     def _write_notes(self, s: ast.stmt) -> None:
         """The comments before a statement, and after the head of one with blocks."""
@@ -80,6 +102,7 @@ class Statements(Calls):
                 raise self.fault(s, "results of different types")
             self.gives = joined
         v = self.cast(v, self.gives, s)
+        self.results.append(v.constant)
         self.emit(f"return {self.stored(v)};")
 
     def do_AnnAssign(self, s: ast.AnnAssign) -> None:
@@ -203,7 +226,10 @@ class Statements(Calls):
             raise self.fault(s, "nothing is assigned")
         known = self.types.get(name)
         if v.type is not None:
-            v = self.as_view(v)
+            shape = v.inner[1] if v.inner and name not in self.parameters else None
+            if isinstance(v.type, Array) and self.shapes.setdefault(name, shape) != shape:
+                self.shapes[name] = shape = None
+            v = Value(v.inner[0], v.type, reads=v.reads, writes=v.writes) if v.inner and shape else self.as_view(v)
             joined = v.type if known is None else known if known == v.type else None
             if joined is None:
                 raise self.fault(s, f"{name} changes its type")
@@ -215,6 +241,8 @@ class Statements(Calls):
             return
         if isinstance(v.type, Struct) and not v.is_lasting and name not in self.parameters:
             self.by_value.add(name)
+        if v.is_constant and v.type in (BOOL, INTEGER) and name in self.flow.once:
+            self.constants[name] = v.constant
         own, text = c_name(name), self.stored(v) if name in self.by_value else v.text
         if isinstance(v.type, Struct) and name in self.parameters and not v.is_lasting:
             raise self.fault(s, "a parameter that becomes a new NamedTuple")
@@ -226,6 +254,8 @@ class Statements(Calls):
 
     def _kind_of(self, name: str) -> str:
         t, spell = self.types[name], self.program.spell
+        if self.shapes.get(name) is not None:
+            return spell.pointer(t)
         return f"{spell.value(t)} " if name in self.by_value else spell.variable(t)
 
     def _declare(self, name: str) -> None:
@@ -267,8 +297,15 @@ class Statements(Calls):
             self._last = s.lineno
             self._same_level(s.body if test.constant else s.orelse)
             return
+        begin, noted = len(self.lines), self._noted()
         self.emit(f"if ({test.text}) {{")
-        self.inside(s.body)
+        try:
+            self.inside(s.body)
+        except Unreachable:  # the test is never true
+            self._forget(begin, noted)
+            self._last = s.lineno
+            self._same_level(s.orelse)
+            return
         rest = s.orelse
         while len(rest) == 1 and isinstance(rest[0], ast.If):
             inner, n = rest[0], len(self.lines)
@@ -277,12 +314,20 @@ class Statements(Calls):
             if len(self.lines) > n or test.is_constant or homes or self.comments.get(inner.lineno, ("", False))[0]:
                 del self.lines[n:]
                 break
+            n, noted = len(self.lines), self._noted()
             self.emit(f"}} else if ({test.text}) {{")
-            self.inside(inner.body)
+            try:
+                self.inside(inner.body)
+            except Unreachable:
+                self._forget(n, noted)
             rest = inner.orelse
         if rest:
+            n, noted = len(self.lines), self._noted()
             self.emit("} else {")
-            self.inside(rest)
+            try:
+                self.inside(rest)
+            except Unreachable:
+                self._forget(n, noted)
         self.emit("}")
 
     def _same_level(self, statements: list[ast.stmt]) -> None:
@@ -296,16 +341,20 @@ class Statements(Calls):
 
     def inside(self, statements: list[ast.stmt]) -> None:
         self.indent += 1
-        self.block(statements)
-        self.indent -= 1
+        try:
+            self.block(statements)
+        finally:
+            self.indent -= 1
 
     def do_While(self, s: ast.While) -> None:
         if s.orelse:
             raise self.fault(s, "a loop with else")
-        n = len(self.lines)
+        n, noted = len(self.lines), self._noted()
         self.indent += 1
-        test = self.truth(s.test)
-        self.indent -= 1
+        try:
+            test = self.truth(s.test)
+        finally:
+            self.indent -= 1
         before, self.lines[n:] = self.lines[n:], []
         if before:
             self.emit("while (true) {")
@@ -313,16 +362,25 @@ class Statements(Calls):
             self.lines.append("    " * (self.indent + 1) + f"if (!({test.text})) break;")
         else:
             self.emit(f"while ({test.text}) {{")
-        self.inside(s.body)
+        try:
+            self.inside(s.body)
+        except Unreachable:
+            self._forget(n, noted)
+            return
         self.emit("}")
 
     def do_For(self, s: ast.For) -> None:
         if s.orelse:
             raise self.fault(s, "a loop with else")
-        if is_range(s.iter):
-            self.count(s)
-        else:
-            self.for_each(s)
+        begin, noted, indent = len(self.lines), self._noted(), self.indent
+        try:
+            if is_range(s.iter):
+                self.count(s)
+            else:
+                self.for_each(s)
+        except Unreachable:  # it has no turns
+            self._forget(begin, noted)
+            self.indent = indent
 
     def count(self, s: ast.For) -> None:
         """A loop over a range."""

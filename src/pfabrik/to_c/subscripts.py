@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import ast
+import math
 from collections.abc import Sequence
 from functools import reduce
 from typing import Any
 
 from .operators import Operators
-from .types import BOOL, INTEGER, Array, Record, Tuple, element_of
+from .types import BOOL, INTEGER, Array, Record, Tuple, Unreachable, element_of
 from .values import POSTFIX, SUM, UNARY, Value, c_name, conflict, effects, is_simple
 
 
@@ -62,10 +63,14 @@ class Subscripts(Operators):
     def element(self, v: Value, indices: list[Value]) -> Value:
         """An element of an array: a number, or a record by its address."""
         t, more = v.type, effects([v, *indices])
+        self.require_elements(v)
         if v.inner:
             path, shape = v.inner
             inside = [f"IN({i.text}, {length})" for i, length in zip(indices, shape, strict=True)]
             text = reduce(lambda before, k: f"({before}) * {shape[k]} + {inside[k]}", range(1, len(shape)), inside[0])
+            if isinstance(t.element, Record):
+                self.program.spell.value(t.element)
+                return Value(f"&{path}[{text}]", t.element, UNARY, **more)
             return self.read(f"{path}[{text}]", t.element, more)
         text = v.text if is_simple(v.text) else self.keep(v).text
         places = ", ".join(i.at(SUM) for i in indices)
@@ -77,6 +82,11 @@ class Subscripts(Operators):
             return Value(f"&{macro}", t.element, UNARY, **more)
         return self.read(macro, t.element, more)
 
+    def require_elements(self, v: Value) -> None:
+        """Unreachable if an array has no elements, as the facts say."""
+        if v.possible == frozenset({0}) or (v.inner and 0 in v.inner[1]):
+            raise Unreachable
+
     def read(self, text: str, kind: str, more: dict[str, frozenset[str]], owner: str = "") -> Value:
         """A number in memory."""
         self.reads |= {owner or kind}
@@ -87,7 +97,14 @@ class Subscripts(Operators):
         if not indices:
             return v
         more = effects([v, *indices])
-        v = self.as_view(v)
+        self.require_elements(v)
+        if v.inner:
+            path, shape = v.inner
+            inside = [f"IN({i.text}, {length})" for i, length in zip(indices, shape, strict=False)]
+            text = reduce(lambda before, k: f"({before}) * {shape[k]} + {inside[k]}", range(1, len(inside)), inside[0])
+            left = shape[len(inside) :]
+            path = f"({path} + ({text}) * {math.prod(left)})"
+            return Value(path, Array(v.type.element, len(left)), inner=(path, left), **more)
         if not v.type.is_contiguous:
             return self.strided(v, indices)
         text, t = v.text, v.type
@@ -97,7 +114,6 @@ class Subscripts(Operators):
 
     def sliced(self, v: Value, indices: list[ast.expr], node: ast.AST) -> Value:
         """A part of an array: contiguous if only its rows are fewer, else with steps."""
-        v = self.as_view(v)
         if any(isinstance(i, ast.Slice) and i.step is not None for i in indices):
             raise self.fault(node, "a slice with a step")
         *before, part = indices
@@ -106,6 +122,9 @@ class Subscripts(Operators):
             v = self.rows(v, self.places(v, before, 0, node))
             if part.lower is None and part.upper is None:
                 return v
+            if v.inner and (known := self.known_part(v, part, node)) is not None:
+                return known
+            v = self.as_view(v)
             ends = [self.end(part.lower, node) if part.lower is not None else Value("0", INTEGER)]
             made = Array(v.type.element, v.type.ndim)
             v = self.cast(v, made, node) if v.type.width else v
@@ -116,10 +135,25 @@ class Subscripts(Operators):
             return Value(
                 f"{'part' if end else 'rest'}_{name}({v.text}, {ends[0].text}{end})", made, **effects([v, *ends])
             )
+        v = self.as_view(v)
         places: list[Value | ast.Slice] = []
         for k, i in enumerate(indices):
             places.append(i if isinstance(i, ast.Slice) else self.places(v, [i], k, node)[0])
         return self.strided(v, places)
+
+    def known_part(self, v: Value, part: ast.Slice, node: ast.AST) -> Value | None:
+        """A part of an array of known shape between constant ends within it; None if it is none."""
+        assert v.inner is not None
+        path, (n, *more) = v.inner
+        ends = [None if end is None else self.end(end, node) for end in (part.lower, part.upper)]
+        if any(end is not None and not end.is_constant for end in ends):
+            return None
+        first = ends[0].constant if ends[0] is not None else 0
+        end = ends[1].constant if ends[1] is not None else n
+        if not 0 <= first <= end <= n:
+            return None
+        path = f"({path} + {first * math.prod(more)})" if first else path
+        return Value(path, v.type, inner=(path, (end - first, *more)), **effects([v]))
 
     def end(self, node: ast.expr, whole: ast.AST) -> Value:
         """Where a slice begins or ends."""

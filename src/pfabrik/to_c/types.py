@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,10 @@ WIDE = 32
 
 class Unsupported(Exception):
     """An unsupported construct, with its place in the source."""
+
+
+class Unreachable(Exception):
+    """Code that the facts do not let happen: it has an element of an array that has none."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +40,7 @@ class Array:
     ndim: int
     is_contiguous: bool = True
     width: int = 0  # constant length of the rows, if it is known
+    shape: tuple[int, ...] | None = None  # of a parameter that is a pointer
 
 
 @dataclass(frozen=True)
@@ -54,6 +60,15 @@ class Struct:
 
     cls: Any
     items: tuple[Any, ...] = field(hash=False)  # long, and looked up at every call
+
+
+class Layout(NamedTuple):
+    """How NamedTuples are structs of C; fields by the names of their class and of themselves."""
+
+    fields: frozenset[tuple[str, str]] | None = None  # that are read: others are left out; all if None
+    shapes: Mapping[tuple[str, str], tuple[int, ...]] = {}  # of arrays that have one wherever they are: pointers then
+    constant: frozenset[tuple[str, str]] = frozenset()  # NamedTuples that are constant: pointers too
+    views: frozenset[tuple[Any, str]] = frozenset()  # parameters that are arrays of several shapes: no pointers
 
 
 def type_of(value: Any, records: dict[Any, str]) -> Any:
@@ -104,8 +119,13 @@ def without_width(t: Any) -> Any:
 class Spelling:
     """The C types of a program, declared as they are needed."""
 
-    def __init__(self, declare: Any) -> None:
+    def __init__(
+        self,
+        declare: Any,
+        layout: Layout,
+    ) -> None:
         self.declare = declare  # takes a name and its text
+        self.layout = layout
         self.known: dict[Any, str] = {}
         self.taken: set[str] = set()
 
@@ -113,6 +133,8 @@ class Spelling:
         """The C type of a variable, with a space where a name may follow."""
         if isinstance(t, str):
             return {NOTHING: "void ", BOOL: "bool ", INTEGER: "integer ", REAL: "real "}[t]
+        if isinstance(t, Array) and t.shape is not None:
+            return self.pointer(t)
         name = self.value(t)
         return f"{name} *" if isinstance(t, Record) else f"const {name} *" if isinstance(t, Struct) else f"{name} "
 
@@ -127,6 +149,20 @@ class Spelling:
         if t not in self.known:
             self.known[t] = self._define(t)
         return self.known[t]
+
+    def members(self, cls: Any) -> list[str]:
+        """The fields of a NamedTuple that its struct has."""
+        read = self.layout.fields
+        return [each for each in cls._fields if read is None or (cls.__name__, each) in read]
+
+    def pointer(self, t: Array) -> str:
+        """The C type of a pointer to an array of known shape, with a space where a name may follow."""
+        return f"{self.value(t.element)} *"
+
+    def _member(self, cls: Any, field: str, t: Any) -> str:
+        if (cls.__name__, field) in self.layout.constant:
+            return self.variable(t)
+        return self.pointer(t) if (cls.__name__, field) in self.layout.shapes else self.stored(t)
 
     def _named(self, wanted: str) -> str:
         name, k = wanted, 2
@@ -156,7 +192,9 @@ class Spelling:
             name = self._named("_".join(["tuple", *shorts]))
             self.declare(name, f"typedef struct {{ {' '.join(fields)} }} {name};\n")
         else:
-            fields = [f"    {self.stored(item)}{c_name(f)};" for f, item in zip(t.cls._fields, t.items, strict=True)]
+            items = dict(zip(t.cls._fields, t.items, strict=True))
+            fields = [f"    {self._member(t.cls, f, items[f])}{c_name(f)};" for f in self.members(t.cls)]
+            fields = fields or ["    char nothing;"]
             name, doc = self._named(t.cls.__name__), t.cls.__doc__ or ""
             described = "" if doc.startswith(f"{t.cls.__name__}(") else comment(doc)
             self.declare(name, f"{described}typedef struct {{\n" + "\n".join(fields) + f"\n}} {name};\n")

@@ -125,7 +125,7 @@ class Value:
     reads: frozenset[str] = NONE  # kinds of elements in memory that it reads
     writes: frozenset[str] = NONE  # and that functions which it calls write
     possible: frozenset[int] | None = None  # all values that it can have, if the facts say
-    inner: tuple[str, tuple[int, ...]] | None = None  # an array within a record: where it is, and its shape
+    inner: tuple[str, tuple[int, ...]] | None = None  # an array of known shape, as of a record: where, and its shape
     parts: list[Value] | None = None  # items of a tuple that is only written down
     rounded: str = ""  # the real number that an integer is of, which may be more than an integer holds
     is_held: bool = False  # a NamedTuple that has no address yet: the text is its value

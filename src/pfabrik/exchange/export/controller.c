@@ -7,6 +7,8 @@
 #ifndef PFK_H
 #define PFK_H
 
+#include <stdint.h>
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -45,6 +47,19 @@ enum {
 
 #include "machine.h"
 
+/* What the last target that was answered tells of its answer: pfk_ik, pfk_nearest and pfk_ik_or_nearest fill it. */
+typedef struct {
+    int held;       /* of a target out of reach: 0 nothing, 1 its orientation, 2 its position; -1 if all is reached */
+    int jumped;     /* 1 if no motion leads there from the last pose: drives jump */
+    int steps;      /* of all searches, each a linearisation of the machine; 0 where legs answer in closed form */
+    int stretched;  /* the number of a leg at its dead point there, if `holding` is asked for; 0 if there is none */
+    pfk_real moved; /* the largest move of a drive since the last answer, or home [L or rad] */
+} pfk_told;
+
+#include "memory.h"
+
+/* Fill the memory of calls: before all others, and again where a machine begins anew at home. */
+void pfk_begin(pfk_memory *memory);
 /* The pose at home. */
 void pfk_home(pfk_pose *pose);
 /* A pose from a position and from turns about the fixed x, y and z axes, in this order [rad]. */
@@ -54,39 +69,42 @@ int pfk_rpy(const pfk_pose *pose, pfk_real angles[3]);
 /* The meaning of a return code, in words. */
 const char *pfk_what(int code);
 #if IK
-/* Actuators for a target, a whole pose, what the task leaves out too. `pose` must hold a pose, the last one or home: what the task leaves open is completed from
-   there, and `pose` becomes the pose reached. Nothing is written unless 0 is returned. */
-int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS]);
+/* Actuators for a target, a whole pose, what the task leaves out too. `pose` must hold a pose, the last one or home:
+   what the task leaves open is completed from there, and `pose` becomes the pose reached. Nothing is written unless 0
+   is returned. */
+int pfk_ik(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS]);
 #endif
 #if NEAREST
-/* The feasible pose nearest to a target: 0 where it is reached, PFK_PROJECTED, PFK_JUMPED, or PFK_BUDGET. `pose` must hold a feasible
-   pose, the last one or home: the search starts there, and it becomes the nearest, with its actuators; nothing is written
-   where none is found. The search takes at most `steps` steps, a dozen mostly, from there and from each of up to `starts`
-   more places, of PFK_STARTS; 0 in a control loop: less than `steps` x (`starts` + 2) together. `holding`, which may be 0,
-   is filled with 1 for the limits, of PFK_LIMITS, that the pose is at: none where a leg is stretched, at a dead point,
-   which pfk_limits and pfk_ik then say with the code of the leg. */
-int pfk_nearest(const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps, int starts, char *holding);
+/* The feasible pose nearest to a target: 0 where it is reached, PFK_PROJECTED, PFK_JUMPED, or PFK_BUDGET. `pose` must
+   hold a feasible pose, the last one or home: the search starts there, and it becomes the nearest, with its actuators;
+   nothing is written where none is found. The search takes at most `steps` steps, a dozen mostly, from there and from
+   each of up to `starts` more places, of PFK_STARTS; 0 in a control loop: less than `steps` x (`starts` + 2) together,
+   and as many again to tell if drives jump; or at most `memory->most_steps`. `memory->told` says more of the answer.
+   `holding`, which may be 0, is filled with 1 for the limits, of PFK_LIMITS, that the pose is at: none where legs are stretched, at dead points. */
+int pfk_nearest(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps, int starts,
+                char *holding);
 /* What a control loop calls: pfk_ik, and pfk_nearest where that has no answer. */
-int pfk_ik_or_nearest(const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps, int starts, char *holding);
+int pfk_ik_or_nearest(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps,
+                      int starts, char *holding);
 #endif
 #if TURNS
 /* Adds whole turns to actuators that may turn more than once: nearest to those before. */
-int pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real *now);
+int pfk_count_turns(pfk_memory *memory, const pfk_real before[PFK_ACTUATORS], pfk_real *now);
 #endif
 #if LIMITS
 /* Fills the slack of a whole pose in each of PFK_LIMITS limits, negative beyond it [length or rad]. */
-int pfk_limits(const pfk_pose *pose, pfk_real slack[]);
+int pfk_limits(pfk_memory *memory, const pfk_pose *pose, pfk_real slack[]);
 #endif
 #if CLEARANCE
 /* The least distance between two links of a whole pose, negative where they overlap, and the number of their pair, from
    1; where it is less than PFK_CLEARANCE, PFK_PAIR + this number is returned. Nothing is written where legs do not
    reach or close. */
-int pfk_clearance(const pfk_pose *pose, pfk_real distance[1], int *pair);
+int pfk_clearance(pfk_memory *memory, const pfk_pose *pose, pfk_real distance[1], int *pair);
 #endif
 #if BODIES
 /* Fills the displacements from home of the bodies in the list at the top, at a whole pose: what is at x at home is at
    R x + p. Returns what pfk_limits does; where a leg is stretched, bodies are where it comes nearest. */
-int pfk_bodies(const pfk_pose *pose, pfk_pose bodies[PFK_BODIES]);
+int pfk_bodies(pfk_memory *memory, const pfk_pose *pose, pfk_pose bodies[PFK_BODIES]);
 #endif
 #if EFFORT
 /* The force or torque of each actuator [N, N m] at a whole pose that moves with a twist, the velocity of the reference
@@ -94,24 +112,26 @@ int pfk_bodies(const pfk_pose *pose, pfk_pose bodies[PFK_BODIES]);
    coordinates; of these counts what the task sets. Gravity in m/s2, such as {0, 0, -9.80665}. Rotors and friction are
    included. Return codes are those of pfk_limits without its limits, or one that says why there are none; nothing is
    written unless 0 is returned. */
-int pfk_effort(const pfk_pose *pose, const pfk_real twist[6], const pfk_real acceleration[6], const pfk_real gravity[3],
+int pfk_effort(pfk_memory *memory, const pfk_pose *pose, const pfk_real twist[6], const pfk_real acceleration[6],
+               const pfk_real gravity[3],
                pfk_real effort[PFK_ACTUATORS]);
 #endif
 #if FK
 /* The pose at given actuators, by Newton's method from `pose`; `steps` may be 0, or is set to the number of its steps.
+   Where it is led there in parts these may be hundreds: PFK_BUDGET is returned where `memory->most_steps` are spent.
    Limits are not checked. Nothing is written to `pose` unless 0, or PFK_OTHER_MODE, is returned. */
 #if CLEARANCE
 /* Where links are too near the pose is written too, and PFK_PAIR + the number of their pair returned. */
 #endif
-int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
+int pfk_fk(pfk_memory *memory, const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps);
 #endif
 #if JOINTS
 /* The pose at coordinates of the joints in series from the base to the end effector. */
-int pfk_pose_at(const pfk_real joints[PFK_JOINTS], pfk_pose pose[1]);
+int pfk_pose_at(pfk_memory *memory, const pfk_real joints[PFK_JOINTS], pfk_pose pose[1]);
 #endif
 #if TO_ACTUATORS
 /* Actuators at joint coordinates; nothing is written unless 0 is returned. */
-int pfk_to_actuators(const pfk_real joints[PFK_JOINTS], pfk_real actuators[PFK_ACTUATORS]);
+int pfk_to_actuators(pfk_memory *memory, const pfk_real joints[PFK_JOINTS], pfk_real actuators[PFK_ACTUATORS]);
 #endif
 #if TO_JOINTS
 /* Joint coordinates at which actuators are, by Newton's method from those in `joints`; `steps` may be 0, or is set to
@@ -119,11 +139,11 @@ int pfk_to_actuators(const pfk_real joints[PFK_JOINTS], pfk_real actuators[PFK_A
 #if CLEARANCE
 /* Where links are too near the coordinates are written too, and PFK_PAIR + the number of their pair returned. */
 #endif
-int pfk_to_joints(const pfk_real actuators[PFK_ACTUATORS], pfk_real *joints, int *steps);
+int pfk_to_joints(pfk_memory *memory, const pfk_real actuators[PFK_ACTUATORS], pfk_real *joints, int *steps);
 #endif
 #if RATES
-/* Return codes are those of pfk_limits without its limits; nothing is written unless 0 is returned. A crank or carriage at
-   its dead point has rate 0. */
+/* Return codes are those of pfk_limits without its limits; nothing is written unless 0 is returned. A crank or carriage
+   at its dead point has rate 0. */
 #if JOINTS
 typedef const pfk_real *pfk_at; /* joint coordinates; rates are those of the joints, torques also forces of slides */
 #else
@@ -131,13 +151,13 @@ typedef const pfk_pose *pfk_at; /* a whole pose; rates are a twist: the velocity
    velocity, in base coordinates, or the nearest that the legs allow; torques a force there and a moment */
 #endif
 /* Rates of actuators by each of the rates. */
-int pfk_jacobian(pfk_at at, pfk_real jacobian[PFK_ACTUATORS][PFK_RATES]);
+int pfk_jacobian(pfk_memory *memory, pfk_at at, pfk_real jacobian[PFK_ACTUATORS][PFK_RATES]);
 /* Rates of actuators, and back. */
-int pfk_speeds(pfk_at at, const pfk_real rates[PFK_RATES], pfk_real speeds[PFK_ACTUATORS]);
-int pfk_speeds_back(pfk_at at, const pfk_real speeds[PFK_ACTUATORS], pfk_real rates[PFK_RATES]);
+int pfk_speeds(pfk_memory *memory, pfk_at at, const pfk_real rates[PFK_RATES], pfk_real speeds[PFK_ACTUATORS]);
+int pfk_speeds_back(pfk_memory *memory, pfk_at at, const pfk_real speeds[PFK_ACTUATORS], pfk_real rates[PFK_RATES]);
 /* Torques and forces of actuators, the least that give those wanted, and back: what they give. */
-int pfk_torques(pfk_at at, const pfk_real wanted[PFK_RATES], pfk_real torques[PFK_ACTUATORS]);
-int pfk_torques_back(pfk_at at, const pfk_real torques[PFK_ACTUATORS], pfk_real given[PFK_RATES]);
+int pfk_torques(pfk_memory *memory, pfk_at at, const pfk_real wanted[PFK_RATES], pfk_real torques[PFK_ACTUATORS]);
+int pfk_torques_back(pfk_memory *memory, pfk_at at, const pfk_real torques[PFK_ACTUATORS], pfk_real given[PFK_RATES]);
 #endif
 
 #ifdef __cplusplus
@@ -214,6 +234,27 @@ static pfk_Floats1 pfk_opened_row(const pfk_real *values, int n)
 }
 
 #endif
+void pfk_begin(pfk_memory *memory)
+{
+    unsigned char *bytes = (unsigned char *)memory;
+    const unsigned char *from;
+    const void *array;
+    size_t i, k;
+    for (i = 0; i < sizeof *memory; ++i)
+        bytes[i] = 0;
+    for (i = 0; i < sizeof pfk_places / sizeof *pfk_places; ++i) {
+        array = bytes + PFK_UNIT * (size_t)pfk_places[i][1];
+        from = (const unsigned char *)&array;
+        for (k = 0; k < sizeof array; ++k)
+            bytes[PFK_UNIT * (size_t)pfk_places[i][0] + k] = from[k];
+    }
+#include "filling.h"
+#if IK
+    for (i = 0; i < PFK_ACTUATORS; ++i)
+        memory->actuators[i] = pfk_home_actuators[i];
+#endif
+}
+
 void pfk_home(pfk_pose *pose)
 {
     int i, j;
@@ -295,96 +336,123 @@ const char *pfk_what(int code)
 }
 
 #if IK
-static int pfk_ik_in(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS], int attempts)
+static void pfk_tell(pfk_memory *memory, const pfk_real actuators[PFK_ACTUATORS], int held, int jumped)
+{
+    pfk_real move;
+    int i;
+    if (!pfk_is_finite(actuators, PFK_ACTUATORS))
+        return;
+    memory->told.held = held;
+    memory->told.jumped = jumped;
+    memory->told.steps = memory->told.stretched = 0;
+    memory->told.moved = 0.0;
+    for (i = 0; i < PFK_ACTUATORS; ++i) {
+        move = fabs(actuators[i] - memory->actuators[i]) / pfk_units[i];
+        memory->told.moved = move > memory->told.moved ? move : memory->told.moved;
+        memory->actuators[i] = actuators[i];
+    }
+}
+
+static int pfk_ik_in(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS],
+                     int attempts)
 {
     pfk_real wanted[16], own[16];
-    const int code = (int)pfk_reach(&pfk_reaching, pfk_opened(target, wanted), pfk_opened(pose, own), attempts);
+    const int code = (int)pfk_reach(&memory->reaching, pfk_opened(target, wanted), pfk_opened(pose, own), attempts);
     if (code)
         return code;
-    pfk_put_reached(&pfk_reaching, pfk_opened(pose, own), pfk_opened_row(actuators, PFK_ACTUATORS));
+    pfk_put_reached(&memory->reaching, pfk_opened(pose, own), pfk_opened_row(actuators, PFK_ACTUATORS));
     pfk_close(own, pose);
+    pfk_tell(memory, actuators, -1, 0);
     return 0;
 }
 
-int pfk_ik(const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS])
+int pfk_ik(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_real actuators[PFK_ACTUATORS])
 {
-    return pfk_ik_in(target, pose, actuators, PFK_ATTEMPTS);
+    return pfk_ik_in(memory, target, pose, actuators, PFK_ATTEMPTS);
 }
 
 #endif
 #if NEAREST
-int pfk_nearest(const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps, int starts, char *holding)
+int pfk_nearest(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps, int starts,
+                char *holding)
 {
-    pfk_real wanted[16], own[16];
+    pfk_real *const own = memory->projecting_start_poses;
     int i, code;
     starts = starts < 0 ? 0 : (starts > PFK_STARTS ? PFK_STARTS : starts);
     steps = steps < 1 ? 1 : (steps > 10000 ? 10000 : steps);
-    code = (int)pfk_project_target(&pfk_projecting, &pfk_reaching, pfk_opened(target, wanted), pfk_opened(pose, own),
-                                   pfk_opened_row(actuators, PFK_ACTUATORS), steps, starts);
+    code = (int)pfk_project_target(&memory->projecting, &memory->reaching,
+                                   pfk_opened(target, memory->projecting_targets), pfk_opened(pose, own),
+                                   pfk_opened_row(actuators, PFK_ACTUATORS), steps, starts,
+                                   memory->most_steps > 0 ? memory->most_steps : 0);
     if (code == PFK_NO_POSE)
         return code;
     pfk_close(own, pose);
+    if (memory->projecting_notes[0] > -2)
+        pfk_tell(memory, actuators, (int)memory->projecting_notes[0], code == PFK_JUMPED);
+    memory->told.steps = (int)memory->projecting_notes[1];
     for (i = 0; i < PFK_LIMITS && holding; ++i)
         holding[i] = 0;
-    if (!holding || pfk_rest(&pfk_reaching, pfk_opened(pose, own)) >= PFK_LEG)
+    if (!holding || pfk_rest(&memory->reaching, pfk_opened(pose, own)) >= PFK_LEG)
         return code;
+    memory->told.stretched = (int)pfk_stretched_leg(memory->reaching.near_, &memory->reaching.scratch);
     for (i = 0; i < PFK_LIMITS; ++i)
-        holding[i] = pfk_reaching_slack[i] <= PFK_ACTIVE * pfk_limit_units[i];
+        holding[i] = memory->reaching_slack[i] <= PFK_ACTIVE * pfk_limit_units[i];
     return code;
 }
 
-int pfk_ik_or_nearest(const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps, int starts, char *holding)
+int pfk_ik_or_nearest(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps,
+                      int starts, char *holding)
 {
-    int i, code = pfk_ik_in(target, pose, actuators, 1);
+    int i, code = pfk_ik_in(memory, target, pose, actuators, 1);
     if (code && code != PFK_NO_POSE)
-        return pfk_nearest(target, pose, actuators, steps, starts, holding);
+        return pfk_compute_nearest(memory, target, pose, actuators, steps, starts, holding);
     for (i = 0; i < PFK_LIMITS && holding; ++i)
-        holding[i] = !code && pfk_reaching_slack[i] <= PFK_ACTIVE * pfk_limit_units[i];
+        holding[i] = !code && memory->reaching_slack[i] <= PFK_ACTIVE * pfk_limit_units[i];
     return code;
 }
 
 #endif
 #if TURNS
-int pfk_count_turns(const pfk_real before[PFK_ACTUATORS], pfk_real *now)
+int pfk_count_turns(pfk_memory *memory, const pfk_real before[PFK_ACTUATORS], pfk_real *now)
 {
-    pfk_put_turns(&pfk_reaching, pfk_opened_row(before, PFK_ACTUATORS), pfk_opened_row(now, PFK_ACTUATORS));
+    pfk_put_turns(&memory->reaching, pfk_opened_row(before, PFK_ACTUATORS), pfk_opened_row(now, PFK_ACTUATORS));
     return 0;
 }
 
 #endif
 #if LIMITS
-int pfk_limits(const pfk_pose *pose, pfk_real slack[])
+int pfk_limits(pfk_memory *memory, const pfk_pose *pose, pfk_real slack[])
 {
     pfk_real own[16];
-    const int code = (int)pfk_rest(&pfk_reaching, pfk_opened(pose, own));
+    const int code = (int)pfk_rest(&memory->reaching, pfk_opened(pose, own));
     int i;
     for (i = 0; i < PFK_LIMITS; ++i)
-        slack[i] = code < 0 || (code >= PFK_LEG && code < 10 * PFK_LEG) ? slack[i] : pfk_reaching_slack[i];
+        slack[i] = code < 0 || (code >= PFK_LEG && code < 10 * PFK_LEG) ? slack[i] : memory->reaching_slack[i];
     return code;
 }
 
 #endif
 #if CLEARANCE
-int pfk_clearance(const pfk_pose *pose, pfk_real distance[1], int *pair)
+int pfk_clearance(pfk_memory *memory, const pfk_pose *pose, pfk_real distance[1], int *pair)
 {
     pfk_real own[16];
-    int code = (int)pfk_rest(&pfk_reaching, pfk_opened(pose, own));
+    int code = (int)pfk_rest(&memory->reaching, pfk_opened(pose, own));
     if (code < 0 || (code >= PFK_LEG && code < PFK_PAIR))
         return code;
-    *pair = 1 + (int)pfk_measure(&pfk_reaching);
-    *distance = pfk_reaching_distance[0] * PFK_SIZE;
-    return pfk_reaching_distance[0] >= pfk_reaching_links_least[0] - pfk_KEPT ? 0 : PFK_PAIR + *pair;
+    *pair = 1 + (int)pfk_measure(&memory->reaching);
+    *distance = memory->reaching_distance[0] * PFK_SIZE;
+    return memory->reaching_distance[0] >= pfk_reaching_links_least[0] - pfk_KEPT ? 0 : PFK_PAIR + *pair;
 }
 
 #endif
 #if BODIES
-int pfk_bodies(const pfk_pose *pose, pfk_pose bodies[PFK_BODIES])
+int pfk_bodies(pfk_memory *memory, const pfk_pose *pose, pfk_pose bodies[PFK_BODIES])
 {
     pfk_real own[16];
-    const int code = (int)pfk_put_bodies(&pfk_reaching, pfk_opened(pose, own));
+    const int code = (int)pfk_put_bodies(&memory->reaching, pfk_opened(pose, own));
     int i, j;
     for (i = 0; i < PFK_BODIES && code != PFK_NO_POSE; ++i) {
-        pfk_close(pfk_reaching_links_displaced + 16 * i, &bodies[i]);
+        pfk_close(memory->reaching_links_displaced + 16 * i, &bodies[i]);
         for (j = 0; j < 3; ++j)
             bodies[i].p[j] *= PFK_SIZE;
     }
@@ -393,93 +461,103 @@ int pfk_bodies(const pfk_pose *pose, pfk_pose bodies[PFK_BODIES])
 
 #endif
 #if EFFORT
-int pfk_effort(const pfk_pose *pose, const pfk_real twist[6], const pfk_real acceleration[6], const pfk_real gravity[3],
+int pfk_effort(pfk_memory *memory, const pfk_pose *pose, const pfk_real twist[6], const pfk_real acceleration[6],
+               const pfk_real gravity[3],
                pfk_real effort[PFK_ACTUATORS])
 {
     pfk_real own[16];
-    return (int)pfk_put_exerted(&pfk_driving, &pfk_reaching, pfk_opened(pose, own), pfk_opened_row(twist, 6),
+    return (int)pfk_put_exerted(&memory->driving, &memory->reaching, pfk_opened(pose, own), pfk_opened_row(twist, 6),
                                 pfk_opened_row(acceleration, 6), pfk_opened_row(gravity, 3),
                                 pfk_opened_row(effort, PFK_ACTUATORS));
 }
 
 #endif
 #if FK
-int pfk_fk(const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
+int pfk_fk(pfk_memory *memory, const pfk_real actuators[PFK_ACTUATORS], pfk_pose *pose, int *steps)
 {
     pfk_real own[16];
-    const int code = (int)pfk_assemble(&pfk_assembling, &pfk_reaching, pfk_opened_row(actuators, PFK_ACTUATORS),
-                                       pfk_opened(pose, own));
+    int code;
+    memory->assembling_scratch_steps[1] = memory->most_steps;
+    code = (int)pfk_assemble(&memory->assembling, &memory->reaching, pfk_opened_row(actuators, PFK_ACTUATORS),
+                             pfk_opened(pose, own));
+    if (code && memory->most_steps > 0 && memory->assembling_scratch_steps[0] >= memory->most_steps)
+        code = PFK_BUDGET;
     if (steps)
-        *steps = (int)pfk_assembling_scratch_steps[0];
+        *steps = (int)memory->assembling_scratch_steps[0];
     pfk_close(own, pose);
     return code;
 }
 
 #endif
 #if JOINTS
-int pfk_pose_at(const pfk_real joints[PFK_JOINTS], pfk_pose pose[1])
+int pfk_pose_at(pfk_memory *memory, const pfk_real joints[PFK_JOINTS], pfk_pose pose[1])
 {
-    if (!pfk_walk(&pfk_series, pfk_opened_row(joints, PFK_JOINTS)))
+    if (!pfk_walk(&memory->series, pfk_opened_row(joints, PFK_JOINTS)))
         return PFK_NO_POSE;
-    pfk_close(pfk_series_pose, pose);
+    pfk_close(memory->series_pose, pose);
     return 0;
 }
 
 #endif
 #if TO_ACTUATORS
-int pfk_to_actuators(const pfk_real joints[PFK_JOINTS], pfk_real actuators[PFK_ACTUATORS])
+int pfk_to_actuators(pfk_memory *memory, const pfk_real joints[PFK_JOINTS], pfk_real actuators[PFK_ACTUATORS])
 {
     pfk_pose pose;
     pfk_real own[16];
     int code;
-    if (!pfk_walk(&pfk_series, pfk_opened_row(joints, PFK_JOINTS)))
+    if (!pfk_walk(&memory->series, pfk_opened_row(joints, PFK_JOINTS)))
         return PFK_NO_POSE;
-    pfk_close(pfk_series_pose, &pose);
-    code = (int)pfk_rest(&pfk_reaching, pfk_opened(&pose, own));
+    pfk_close(memory->series_pose, &pose);
+    code = (int)pfk_rest(&memory->reaching, pfk_opened(&pose, own));
     if (code)
         return code;
-    pfk_put_reached(&pfk_reaching, pfk_opened(&pose, own), pfk_opened_row(actuators, PFK_ACTUATORS));
+    pfk_put_reached(&memory->reaching, pfk_opened(&pose, own), pfk_opened_row(actuators, PFK_ACTUATORS));
     return 0;
 }
 
 #endif
 #if TO_JOINTS
-int pfk_to_joints(const pfk_real actuators[PFK_ACTUATORS], pfk_real *joints, int *steps)
+int pfk_to_joints(pfk_memory *memory, const pfk_real actuators[PFK_ACTUATORS], pfk_real *joints, int *steps)
 {
-    const int code = (int)pfk_put_joints(&pfk_series, &pfk_assembling, &pfk_reaching,
-                                         pfk_opened_row(actuators, PFK_ACTUATORS), pfk_opened_row(joints, PFK_JOINTS));
+    int code;
+    memory->assembling_scratch_steps[1] = memory->most_steps;
+    code = (int)pfk_put_joints(&memory->series, &memory->assembling, &memory->reaching,
+                               pfk_opened_row(actuators, PFK_ACTUATORS), pfk_opened_row(joints, PFK_JOINTS));
+    if (code && memory->most_steps > 0 && memory->assembling_scratch_steps[0] >= memory->most_steps)
+        code = PFK_BUDGET;
     if (steps)
-        *steps = (int)pfk_assembling_scratch_steps[0];
+        *steps = (int)memory->assembling_scratch_steps[0];
     return code;
 }
 
 #endif
 #if RATES
 #if JOINTS
-int pfk_jacobian(pfk_at at, pfk_real jacobian[PFK_ACTUATORS][PFK_RATES])
+int pfk_jacobian(pfk_memory *memory, pfk_at at, pfk_real jacobian[PFK_ACTUATORS][PFK_RATES])
 {
     pfk_pose pose;
     pfk_real own[16];
     int i, j, k, code;
-    if (!pfk_walk(&pfk_series, pfk_opened_row(at, PFK_JOINTS)))
+    if (!pfk_walk(&memory->series, pfk_opened_row(at, PFK_JOINTS)))
         return PFK_NO_POSE;
-    pfk_close(pfk_series_pose, &pose);
-    code = (int)pfk_put_rates(&pfk_rating, &pfk_reaching, pfk_opened(&pose, own), 1, PFK_TURNING);
+    pfk_close(memory->series_pose, &pose);
+    code = (int)pfk_put_rates(&memory->rating, &memory->reaching, pfk_opened(&pose, own), 1, PFK_TURNING);
     for (i = 0; i < PFK_ACTUATORS && !code; ++i)
         for (j = 0; j < PFK_JOINTS; ++j)
             for (jacobian[i][j] = 0.0, k = 0; k < 6; ++k)
-                jacobian[i][j] += pfk_rating_drives[i * PFK_COLUMNS + k] * pfk_series_twists[k * PFK_JOINTS + j];
+                jacobian[i][j] +=
+                    memory->rating_drives[i * PFK_COLUMNS + k] * memory->series_twists[k * PFK_JOINTS + j];
     return code;
 }
 #else
-int pfk_jacobian(pfk_at at, pfk_real jacobian[PFK_ACTUATORS][PFK_RATES])
+int pfk_jacobian(pfk_memory *memory, pfk_at at, pfk_real jacobian[PFK_ACTUATORS][PFK_RATES])
 {
     pfk_real own[16];
-    const int code = (int)pfk_put_rates(&pfk_rating, &pfk_reaching, pfk_opened(at, own), 0, PFK_TURNING);
+    const int code = (int)pfk_put_rates(&memory->rating, &memory->reaching, pfk_opened(at, own), 0, PFK_TURNING);
     int i, j;
     for (i = 0; i < PFK_ACTUATORS && !code; ++i)
         for (j = 0; j < 6; ++j)
-            jacobian[i][j] = pfk_rating_drives[i * PFK_COLUMNS + j];
+            jacobian[i][j] = memory->rating_drives[i * PFK_COLUMNS + j];
     return code;
 }
 #endif
@@ -568,31 +646,31 @@ static void pfk_put_factors(pfk_real jacobian[PFK_ACTUATORS][PFK_RATES], pfk_fac
     }
 }
 
-int pfk_speeds(pfk_at at, const pfk_real rates[PFK_RATES], pfk_real speeds[PFK_ACTUATORS])
+int pfk_speeds(pfk_memory *memory, pfk_at at, const pfk_real rates[PFK_RATES], pfk_real speeds[PFK_ACTUATORS])
 {
     pfk_real jacobian[PFK_ACTUATORS][PFK_RATES];
-    int i, j, code = pfk_jacobian(at, jacobian);
+    int i, j, code = pfk_jacobian(memory, at, jacobian);
     for (i = 0; i < PFK_ACTUATORS && !code; ++i)
         for (speeds[i] = 0.0, j = 0; j < PFK_RATES; ++j)
             speeds[i] += jacobian[i][j] * rates[j];
     return code;
 }
 
-int pfk_torques_back(pfk_at at, const pfk_real torques[PFK_ACTUATORS], pfk_real given[PFK_RATES])
+int pfk_torques_back(pfk_memory *memory, pfk_at at, const pfk_real torques[PFK_ACTUATORS], pfk_real given[PFK_RATES])
 {
     pfk_real jacobian[PFK_ACTUATORS][PFK_RATES];
-    int i, j, code = pfk_jacobian(at, jacobian);
+    int i, j, code = pfk_jacobian(memory, at, jacobian);
     for (j = 0; j < PFK_RATES && !code; ++j)
         for (given[j] = 0.0, i = 0; i < PFK_ACTUATORS; ++i)
             given[j] += jacobian[i][j] * torques[i];
     return code;
 }
 
-int pfk_torques(pfk_at at, const pfk_real wanted[PFK_RATES], pfk_real torques[PFK_ACTUATORS])
+int pfk_torques(pfk_memory *memory, pfk_at at, const pfk_real wanted[PFK_RATES], pfk_real torques[PFK_ACTUATORS])
 {
     pfk_real jacobian[PFK_ACTUATORS][PFK_RATES], z[PFK_RATES];
     pfk_factors own;
-    int i, j, k, code = pfk_jacobian(at, jacobian);
+    int i, j, k, code = pfk_jacobian(memory, at, jacobian);
     if (code)
         return code;
     pfk_put_factors(jacobian, &own);
@@ -611,11 +689,11 @@ int pfk_torques(pfk_at at, const pfk_real wanted[PFK_RATES], pfk_real torques[PF
     return 0;
 }
 
-int pfk_speeds_back(pfk_at at, const pfk_real speeds[PFK_ACTUATORS], pfk_real rates[PFK_RATES])
+int pfk_speeds_back(pfk_memory *memory, pfk_at at, const pfk_real speeds[PFK_ACTUATORS], pfk_real rates[PFK_RATES])
 {
     pfk_real jacobian[PFK_ACTUATORS][PFK_RATES], z[PFK_RATES];
     pfk_factors own;
-    int i, j, k, code = pfk_jacobian(at, jacobian);
+    int i, j, k, code = pfk_jacobian(memory, at, jacobian);
     if (code)
         return code;
     pfk_put_factors(jacobian, &own);
@@ -641,69 +719,163 @@ int pfk_speeds_back(pfk_at at, const pfk_real speeds[PFK_ACTUATORS], pfk_real ra
 #include <stdio.h>
 
 #if CHECKED
-/* A pose, the actuators there, and whether those are within all limits. */
+/* A pose, the actuators there, whether those are within all limits, and whether forward kinematics leads there from
+   home. */
 #if CLEARANCE
 /* And the least distance between its links. */
 #endif
 typedef struct {
     pfk_pose target;
     pfk_real actuators[PFK_ACTUATORS];
-    int kept;
+    int kept, led;
 #if CLEARANCE
     pfk_real distance;
 #endif
 } pfk_check;
 
+#if FAR_CHECKS
+/* A target out of reach, and how far the reference point of its nearest pose is from it. */
+typedef struct {
+    pfk_pose target;
+    pfk_real distance;
+} pfk_far_check;
+
+#endif
+#if TORQUE_CHECKS || EFFORT_CHECKS
+/* A pose, a force and moment there or a twist that is its change too, and the torques or forces of the actuators. */
+typedef struct {
+    pfk_pose pose;
+    pfk_real twist[6], actuators[PFK_ACTUATORS];
+} pfk_load_check;
+
+#endif
 #include "checks.h"
 
+static int pfk_wrong;
+
+/* Counts what differs from the library's answer by more than it may, and prints by how many times. */
+static void pfk_compare(const char *what, int row, pfk_real found, pfk_real expected, pfk_real most)
+{
+    const pfk_real off = fabs(found - expected) / most;
+    if (off <= 1.0)
+        return;
+    printf("%s %d: %ld times farther off than it may be\n", what, row, off < 1e9 ? (long)off : 1000000000L);
+    ++pfk_wrong;
+}
+
+static void pfk_compare_codes(const char *what, int row, int is_right, int code)
+{
+    if (is_right)
+        return;
+    printf("%s %d: %s\n", what, row, pfk_what(code));
+    ++pfk_wrong;
+}
+
+#if FAR_CHECKS
+static void pfk_check_far(pfk_memory *memory)
+{
+    pfk_real actuators[PFK_ACTUATORS] = {0.0}, away, square;
+    pfk_pose pose;
+    int i, j, code;
+    for (i = 0; i < PFK_FAR_CHECKS; ++i) {
+        pfk_home(&pose);
+        code = pfk_nearest(memory, &pfk_far_checks[i].target, &pose, actuators, 200, PFK_STARTS, 0);
+        pfk_compare_codes("target out of reach", i, code == PFK_PROJECTED || code == PFK_JUMPED, code);
+        for (square = 0.0, j = 0; j < 3; ++j) {
+            away = pose.p[j] - pfk_far_checks[i].target.p[j];
+            square += away * away;
+        }
+        pfk_compare("target out of reach", i, sqrt(square), pfk_far_checks[i].distance, PFK_EXACT_NEAREST * PFK_SIZE);
+    }
+}
+
+#endif
+#if TORQUE_CHECKS || EFFORT_CHECKS
+static void pfk_compare_loads(const char *what, int row, const pfk_real *found, const pfk_real *expected)
+{
+    pfk_real most = 0.0;
+    int j;
+    for (j = 0; j < PFK_ACTUATORS; ++j)
+        most = fabs(expected[j]) > most ? fabs(expected[j]) : most;
+    for (j = 0; j < PFK_ACTUATORS; ++j)
+        pfk_compare(what, row, found[j], expected[j], PFK_EXACT_LOADS * most);
+}
+
+#endif
+#if TORQUE_CHECKS
+static void pfk_check_torques(pfk_memory *memory)
+{
+    pfk_real found[PFK_ACTUATORS];
+    int i, code;
+    for (i = 0; i < PFK_TORQUE_CHECKS; ++i) {
+        code = pfk_torques(memory, &pfk_torque_checks[i].pose, pfk_torque_checks[i].twist, found);
+        pfk_compare_codes("torques", i, code == 0, code);
+        if (code == 0)
+            pfk_compare_loads("torques", i, found, pfk_torque_checks[i].actuators);
+    }
+}
+
+#endif
+#if EFFORT_CHECKS
+static void pfk_check_effort(pfk_memory *memory)
+{
+    const pfk_real gravity[3] = {0.0, 0.0, -9.80665}, *twist;
+    pfk_real found[PFK_ACTUATORS];
+    int i, code;
+    for (i = 0; i < PFK_EFFORT_CHECKS; ++i) {
+        twist = pfk_effort_checks[i].twist;
+        code = pfk_effort(memory, &pfk_effort_checks[i].pose, twist, twist, gravity, found);
+        pfk_compare_codes("forces", i, code == 0, code);
+        if (code == 0)
+            pfk_compare_loads("forces", i, found, pfk_effort_checks[i].actuators);
+    }
+}
+
+#endif
 int main(void)
 {
-    pfk_real found[PFK_ACTUATORS], size;
+    static pfk_memory own, *const memory = &own;
+    pfk_real found[PFK_ACTUATORS];
 #if CLEARANCE
     pfk_real distance;
 #endif
     pfk_pose pose;
-    int i, j, code, wrong = 0;
+    int i, j, code;
+    pfk_begin(memory);
     for (i = 0; i < PFK_CHECKS; ++i) {
         pfk_home(&pose);
-        code = pfk_ik(&pfk_checks[i].target, &pose, found);
-        if ((code == 0) != pfk_checks[i].kept) {
-            printf("pose %d: %s\n", i, pfk_what(code));
-            ++wrong;
-        }
-        for (j = 0; code == 0 && j < PFK_ACTUATORS; ++j) {
-            size = pfk_check_units[j];
-            if (!(fabs(found[j] - pfk_checks[i].actuators[j]) <= PFK_EXACT * size)) {
-                printf("pose %d, actuator %d: %.9g\n", i, j, (double)found[j]);
-                ++wrong;
-            }
-        }
+        code = pfk_ik(memory, &pfk_checks[i].target, &pose, found);
+        pfk_compare_codes("pose", i, (code == 0) == pfk_checks[i].kept, code);
+        for (j = 0; code == 0 && j < PFK_ACTUATORS; ++j)
+            pfk_compare("actuators of pose", i, found[j], pfk_checks[i].actuators[j], PFK_EXACT * pfk_units[j]);
 #if CLEARANCE
         if (code == 0) {
-            pfk_clearance(&pose, &distance, &j);
-            if (!(fabs(distance - pfk_checks[i].distance) <= PFK_EXACT * PFK_SIZE)) {
-                printf("pose %d, links: %.9g\n", i, (double)distance);
-                ++wrong;
-            }
+            pfk_clearance(memory, &pose, &distance, &j);
+            pfk_compare("links at pose", i, distance, pfk_checks[i].distance, PFK_EXACT * PFK_SIZE);
         }
 #endif
 #if FK
-        if (code == 0) {
-            pfk_pose back = pose;
-            if (pfk_fk(found, &back, 0) != 0) {
-                printf("pose %d: no way back\n", i);
-                ++wrong;
-            }
-            for (j = 0; j < 3; ++j)
-                if (!(fabs(back.p[j] - pose.p[j]) <= PFK_EXACT * PFK_SIZE)) {
-                    printf("pose %d, back: %.9g\n", i, (double)back.p[j]);
-                    ++wrong;
-                }
+        if (code == 0 && pfk_checks[i].led) {
+            pfk_pose back;
+            pfk_home(&back);
+            code = pfk_fk(memory, found, &back, 0);
+            pfk_compare_codes("back to pose", i, code == 0, code);
+            for (j = 0; code == 0 && j < 3; ++j)
+                pfk_compare("back to pose", i, back.p[j], pose.p[j], PFK_EXACT_BACK * PFK_SIZE);
         }
 #endif
     }
-    printf("%d poses, %d wrong\n", PFK_CHECKS, wrong);
-    return wrong != 0;
+#if FAR_CHECKS
+    pfk_check_far(memory);
+#endif
+#if TORQUE_CHECKS
+    pfk_check_torques(memory);
+#endif
+#if EFFORT_CHECKS
+    pfk_check_effort(memory);
+#endif
+    printf("%d poses, %d wrong\n", PFK_CHECKS, pfk_wrong);
+    return pfk_wrong != 0;
 }
 #else
 int main(void)

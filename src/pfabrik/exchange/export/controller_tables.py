@@ -248,6 +248,7 @@ def _projecting(model: Model, reaching: Reaching, options: Options) -> Projectin
         new_solutions(1, legs, n_a),
         Start(np.zeros((1, 4, 4)), np.zeros((1, legs)), np.zeros((1, n_a))),
         np.zeros((1, 4, 4)),
+        np.zeros(2, np.int64),
     )
 
 

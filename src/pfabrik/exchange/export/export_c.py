@@ -36,7 +36,7 @@ def export_c(
     joints: str | Sequence[str] | None = None,
     hold_price: float = USUAL.hold_price,
 ) -> Path:
-    """Write a mechanism's kinematics as one file of C99, for a controller.
+    """Write a mechanism's kinematics as a file of C99 with its header, for a controller.
 
     The file is the library's own kernels for this machine; it allocates nothing, and needs only the C library's
     mathematics. Its comment lists units, limits and legs. Actuators, limits and poses are those of the library, in
@@ -48,7 +48,8 @@ def export_c(
     mechanism : Mechanism
         The machine.
     path : str or PathLike
-        The file to write; whatever has this name is replaced, when the text is complete.
+        The file to write; its header has the same name with the ending ".h". Whatever has these names is replaced, when
+        the text is complete.
     precision : {"double", "float"}, optional
         "float" is for controllers without double precision in hardware. Rods of a pair that differ by less than 1e-6
         of the characteristic length then count as equal; the file says which.
@@ -86,9 +87,26 @@ def export_c(
         hold_price=hold_price,
         file=require_path("path", path).name,
     )
-    with whole_path(path) as part:
-        part.write_text(text, encoding="ascii")
+    header = header_of(Path(path))
+    declarations, definitions = in_two(text, header.name)
+    with whole_path(path) as part, whole_path(header) as beside:
+        part.write_text(definitions, encoding="ascii")
+        beside.write_text(declarations, encoding="ascii")
     return Path(path)
+
+
+def header_of(path: Path) -> Path:
+    """The header beside a file."""
+    if path.suffix == ".h":
+        raise InvalidArgument("path", repr(path.name), "another ending than that of its header, .h")
+    return path.with_suffix(".h")
+
+
+def in_two(text: str, header: str) -> tuple[str, str]:
+    """A header of the given name, and the file that includes it, of a text with both."""
+    head, _, definitions = re.split(r"(?m)^#ifndef (\w+_DECLARATIONS_ONLY)\n", text, maxsplit=1)
+    comment = head[: head.index("#ifndef")]
+    return head.rstrip("\n") + "\n", f'{comment}#include "{header}"\n{definitions.rstrip().removesuffix("#endif")}'
 
 
 def c_source(

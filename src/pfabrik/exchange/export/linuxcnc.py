@@ -15,6 +15,18 @@ from .fits import Thigh, Tower, angle_of, struts_of, thighs_of, towers_of
 from .machine_data import Machine
 from .static_data import comment
 
+MEMORY = """\
+static pfk_memory *memory(void)
+{
+    static pfk_memory own;
+    static int has_begun;
+    if (!has_begun)
+        pfk_begin(&own);
+    has_begun = 1;
+    return &own;
+}
+"""
+
 INVERSE = """\
 int kinematicsInverse(const EmcPose *world, double *joints, const KINEMATICS_INVERSE_FLAGS *iflags,
                       KINEMATICS_FORWARD_FLAGS *fflags)
@@ -28,7 +40,7 @@ int kinematicsInverse(const EmcPose *world, double *joints, const KINEMATICS_INV
     pfk_home(&pose);
     pfk_pose_rpy(world->tran.x, world->tran.y, world->tran.z, world->a / turn, world->b / turn, world->c / turn,
                  &target);
-    if (pfk_ik(&target, &pose, actuators) != 0)
+    if (pfk_ik(memory(), &target, &pose, actuators) != 0)
         return -1;
     for (i = 0; i < PFK_ACTUATORS; ++i)
         joints[i] = actuators[i] * pfk_shown[i];
@@ -51,9 +63,9 @@ int kinematicsForward(const double *joints, EmcPose *world, const KINEMATICS_FOR
     /* from where it was; if that leads nowhere, from home */
     pfk_pose_rpy(world->tran.x, world->tran.y, world->tran.z, world->a / turn, world->b / turn, world->c / turn,
                  &pose);
-    if (pfk_fk(actuators, &pose, 0) != 0) {
+    if (pfk_fk(memory(), actuators, &pose, 0) != 0) {
         pfk_home(&pose);
-        if (pfk_fk(actuators, &pose, 0) != 0)
+        if (pfk_fk(memory(), actuators, &pose, 0) != 0)
             return -1;
     }
     pfk_rpy(&pose, angles);
@@ -113,6 +125,7 @@ def module(machine: Machine) -> str:
 {c_source(mechanism)}
 static const double pfk_shown[PFK_ACTUATORS] = {{{", ".join(angles)}}};
 
+{MEMORY}
 {INVERSE}
 {FORWARD}
 {COMPONENT}"""

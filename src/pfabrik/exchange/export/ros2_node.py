@@ -113,7 +113,7 @@ def _example_target(mechanism: Mechanism, metres: float) -> str:
 def _words(machine: Machine, description: PlatformDescription, parts: list[Part], name: str) -> dict[str, str]:
     mechanism, metres = machine.mechanism, description.metres
     size, has = mechanism.characteristic_length * metres, features(machine, parts)
-    nearest = f"{name}_ik_or_nearest(&wanted, &pose, actuators, settings_.steps, settings_.starts, holding)"
+    nearest = f"{name}_ik_or_nearest(&memory_, &wanted, &pose, actuators, settings_.steps, settings_.starts, holding)"
     too_near = f" || code > {name.upper()}_PAIR" if "CLEARANCE" in has else ""
     actuators = [
         [_exact(actuator), _truth(each.is_length), *map(literal, (*_units(each.is_length, metres, size), each.home))]
@@ -147,11 +147,15 @@ def _words(machine: Machine, description: PlatformDescription, parts: list[Part]
         "HAS_NEAREST": _truth("nearest" in parts),
         "HAS_FORWARD": _truth("fk" in parts),
         "OUT_OF_REACH": "project" if "nearest" in parts else "hold",
-        "ANSWER": nearest if "nearest" in parts else f"{name}_ik(&wanted, &pose, actuators)",
+        "ANSWER": nearest if "nearest" in parts else f"{name}_ik(&memory_, &wanted, &pose, actuators)",
         "JUMPED": f"code_ == {name.upper()}_JUMPED" if "nearest" in parts else "false",
-        "FORWARD": f"{name}_fk(actuators, &pose, nullptr)" if "fk" in parts else f"{name.upper()}_NO_ACTUATORS",
-        "COUNT_TURNS": f"{name}_count_turns(before, actuators);" if "TURNS" in has else "",
-        "MEASURE_LINKS": f"{name}_clearance(&commanded_.pose, &between_, &pair_);" if "CLEARANCE" in has else "",
+        "FORWARD": f"{name}_fk(&memory_, actuators, &pose, nullptr)"
+        if "fk" in parts
+        else f"{name.upper()}_NO_ACTUATORS",
+        "COUNT_TURNS": f"{name}_count_turns(&memory_, before, actuators);" if "TURNS" in has else "",
+        "MEASURE_LINKS": f"{name}_clearance(&memory_, &commanded_.pose, &between_, &pair_);"
+        if "CLEARANCE" in has
+        else "",
         "PAIR": f"{name.upper()}_PAIR + platform_.pair()" if "CLEARANCE" in has else "0",
         "CLEARANCE": literal((mechanism.clearance or 0.0) * metres),
         "ROUNDING": literal(ACTIVE["double"] * size),

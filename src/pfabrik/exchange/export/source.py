@@ -14,6 +14,8 @@ from ...common.arrays import Floats, Mask
 from ...configuration import configuration
 from ...feasibility import feasibility
 from ...ik import solve_ik
+from ...kernels.controller.reached import ATTEMPTS, MOST_PARTS
+from ...kernels.legs.leg_constants import MOST_STEPS, MOST_STEPS_IMPLICIT
 from ...kinematics import JointPath, engine_of, generic_of
 from ...machine.description.mechanism import Mechanism
 from ...machine.poses import pose
@@ -22,6 +24,7 @@ from ...tolerances import TOLERANCES
 from .controller_tables import ControllerTables, controller_tables
 from .finite_results import with_finite_results
 from .machine_data import Machine
+from .self_test import are_led_from_home, far_checks, far_lines, load_checks, load_lines
 from .static_data import Precision, comment, in_words, literal, table, words
 from .translated import Translated, translated
 
@@ -36,6 +39,11 @@ search for the nearest of all takes a hundred times as long."""
 
 AGREEMENT: dict[Precision, float] = {"double": 1e-10, "float": 1e-4}
 """Tolerance to which actuators must agree [L or rad]: rounding may leave as much near a dead point."""
+
+BACK: dict[Precision, float] = {"double": 1e-9, "float": 1e-3}
+NEAREST: dict[Precision, float] = {"double": 1e-6, "float": 1e-3}
+LOADS: dict[Precision, float] = {"double": 1e-8, "float": 2e-3}
+"""Tolerances of where actuators lead and of distances from targets [L], and of torques and forces, as a share."""
 
 CLEAR = 1e-3
 """Margin beyond which a pose counts as inside or outside its limits without doubt, a share of the range."""
@@ -170,18 +178,27 @@ def source(
     routines = resources.files(__package__).joinpath("controller.c").read_text(encoding="utf-8")
     checks = checks_of(machine, "limits" in parts) if "ik" in parts else None
     conditions = features(machine, parts, path) | ({"CHECKED"} if checks is not None and len(checks.targets) else set())
+    asked = {} if checks is None else _asked(machine, checks, conditions, precision)
+    conditions |= {name for name, lines in asked.items() if lines}
     tables = controller_tables(machine, parts, path)
     made = translated(tables, conditions, precision)
     included = {
         "machine.h": _machine_h(machine, tables, parts, path),
+        "memory.h": made.types,
         "kernels.h": made.kernels,
+        "filling.h": made.filling,
         "tables.h": "\n".join([made.data, *_tables(machine, precision, parts, path, len(tables.reaching.ways))]),
     }
     if checks is not None:
-        included["checks.h"] = _checks_h(checks, _units(machine), AGREEMENT[precision])
+        more = [line for lines in asked.values() for line in lines]
+        included["checks.h"] = "\n".join([*more, _checks_h(machine, checks, conditions, precision)])
     text = with_finite_results(selected(routines[routines.index("#ifndef") :], conditions))
     text = re.sub(r'^#include "(.*)"\n', lambda match: included[match[1]], text, flags=re.MULTILINE)
-    body = in_words(re.sub(r"\n{3,}", "\n\n", f"{_header(machine, made, parts, path)}\n{text}"), name, precision)
+    whole = f"{_header(machine, made, tables, parts, path)}\n{text}"
+    body = in_words(re.sub(r"\n{3,}", "\n\n", whole), name, precision)
+    body = body.replace(f"{name.upper()}_MEMORY_", f"{name}_memory").replace(
+        f"{name.upper()}_MOST_", "the `most_steps`"
+    )
     return body.replace("_SELF_TEST FILE -lm", f"_SELF_TEST {comment(file)} -lm", 1)
 
 
@@ -192,6 +209,7 @@ def features(machine: Machine, parts: Sequence[str], path: JointPath | None = No
         "CLEARANCE": machine.links_kept(parts) is not None,
         "JOINTS": path is not None,
         "TO_ACTUATORS": path is not None and "ik" in parts,
+        "TORQUES": path is None and "rates" in parts,
         "TO_JOINTS": path is not None and "fk" in parts,
         "RESTS": {"limits", "nearest"} & {*parts} or (path is not None and "ik" in parts),
     }
@@ -248,8 +266,12 @@ def _tables(
     }
     yield f"enum {{ {', '.join(f'PFK_{name} = {count}' for name, count in counts.items())} }};"
     yield f"static const pfk_real pfk_reference[3] = {literal(np.asarray(machine.mechanism.reference_point))};"
-    if "rates" in parts:
+    if {"ik", "rates"} & {*parts}:
         yield f"static const pfk_real pfk_units[PFK_ACTUATORS] = {literal(_units(machine))};"
+    if "ik" in parts:
+        homes = literal(np.array([driven.home for driven in machine.driven]))
+        yield f"static const pfk_real pfk_home_actuators[PFK_ACTUATORS] = {homes};"
+    if "rates" in parts:
         yield f"static const pfk_real pfk_rate_units[] = {literal(rate_units(machine, path))};"
     if "nearest" in parts:
         of_ranges = [size if each.is_length else 1.0 for each in machine.limited for _ in range(2)]
@@ -277,29 +299,68 @@ def rate_units(machine: Machine, path: JointPath | None) -> Floats:
     return np.array([1.0 if each.kind == "angle" else size for each in path.coordinates])
 
 
-def _checks_h(checks: Checks, units: Floats, exact: float) -> str:
-    """Poses for the self-test, and the tolerance of actuators [L or rad]."""
-    lines = [f"#define PFK_EXACT {literal(exact)}", f"enum {{ PFK_CHECKS = {len(checks.targets)} }};"]
-    lines += [f"static const pfk_real pfk_check_units[PFK_ACTUATORS] = {literal(units)};", ""]
+def _asked(machine: Machine, checks: Checks, conditions: set[str], precision: Precision) -> dict[str, list[str]]:
+    """What the self-test asks beside actuators, by its condition in `controller.c`; nothing where there is nothing."""
+    asked: dict[str, list[str]] = {}
+    if "NEAREST" in conditions and len((far := far_checks(machine, checks.targets)).targets):
+        exact = f"#define PFK_EXACT_NEAREST {literal(NEAREST[precision])} /* of distances from targets [L] */"
+        asked["FAR_CHECKS"] = [exact, *far_lines(far)]
+    inside = checks.targets[checks.kept]
+    for part, name, moves in (("TORQUES", "torque", False), ("EFFORT", "effort", True)):
+        if part in conditions and len((loads := load_checks(machine, inside, moves=moves)).poses):
+            asked[f"{name.upper()}_CHECKS"] = list(load_lines(name, loads))
+    if {"TORQUE_CHECKS", "EFFORT_CHECKS"} & {*asked}:
+        exact = f"#define PFK_EXACT_LOADS {literal(LOADS[precision])} /* of torques and forces, a share */"
+        asked["LOADS"] = [exact]
+    return asked
+
+
+def _checks_h(machine: Machine, checks: Checks, conditions: set[str], precision: Precision) -> str:
+    """What the self-test asks and compares, and tolerances."""
+    lines = [f"#define PFK_EXACT {literal(AGREEMENT[precision])} /* of actuators [L or rad] */"]
+    lines.append(f"enum {{ PFK_CHECKS = {len(checks.targets)} }};")
+    if "FK" in conditions:
+        lines.append(f"#define PFK_EXACT_BACK {literal(BACK[precision])} /* of where actuators lead [L] */")
+    led = np.zeros(len(checks.targets), dtype=bool)
+    if "FK" in conditions:
+        led = are_led_from_home(machine, checks.targets, checks.actuators)
     distances = [""] * len(checks.targets)
     if checks.distances is not None:
         distances = [f", {literal(float(distance))}" for distance in checks.distances]
     rows = (
-        f"    {{{{{literal(target[:3, 3])}, {literal(target[:3, :3])}}}, {literal(actuators)}, {int(kept)}{distance}}}"
-        for target, actuators, kept, distance in zip(*checks[:3], distances, strict=True)
+        f"    {{{{{literal(target[:3, 3])}, {literal(target[:3, :3])}}}, {literal(actuators)}, "
+        f"{int(kept)}, {int(is_led)}{distance}}}"
+        for target, actuators, kept, is_led, distance in zip(*checks[:3], led, distances, strict=True)
     )
     return "\n".join([*lines, *table("pfk_check pfk_checks[PFK_CHECKS]", rows)])
 
 
-def _header(machine: Machine, made: Translated, parts: Sequence[str], path: JointPath | None) -> str:
+def steps_in_words(machine: Machine, tables: ControllerTables, parts: Sequence[str]) -> Iterator[str]:
+    """The most Newton steps of calls, and what bounds them."""
+    if "ik" in parts and (machine.completes or machine.has_implicit_joints):
+        each = MOST_STEPS_IMPLICIT if machine.has_implicit_joints else MOST_STEPS
+        ways = len(tables.reaching.ways)
+        most = each * (1 if ways == 1 else ways // ATTEMPTS * (1 + (ATTEMPTS - 1) * MOST_PARTS))
+        yield f"pfk_ik takes at most {most:,} Newton steps, mostly less than six."
+    if tables.assembling is not None:
+        yield "pfk_fk takes mostly five Newton steps, and hundreds where it is led far in parts: `most_steps` in its"
+        yield "memory bounds them."
+    yield ""
+
+
+def _header(
+    machine: Machine, made: Translated, tables: ControllerTables, parts: Sequence[str], path: JointPath | None
+) -> str:
     """The comment at the top: conventions, actuators, limits and legs, and the notice."""
     mechanism, unit = machine.mechanism, machine.mechanism.length_unit
     lines = [
         f"The kinematics of '{mechanism.name}', written by pfabrik from its description.",
         "",
-        "C99, and C++ as it is; only the C library's mathematics. Nothing is allocated, and no answer depends on an",
-        "earlier one; but the memory of a call is static, so that one call is to end before the next begins.",
-        f"On 32 bits this is {made.memory:,} bytes of RAM, and tables are {made.constants:,} bytes of constants.",
+        "C99, and C++ as it is; only the C library's mathematics. Nothing is allocated, and nothing is static but",
+        "constants: the memory of calls is the caller's, one PFK_MEMORY_ for each machine and each thread or interrupt",
+        "that calls. `pfk_begin` fills it, and it may not be moved then. No answer depends on an earlier one, but that",
+        "it is told whether drives jump, and how far they move.",
+        f"On 32 bits this memory is {made.memory:,} bytes, and tables are {made.constants:,} bytes of constants.",
         f"Lengths in {unit}, angles in radians. A pose maps platform coordinates, as at home and from the reference",
         "point, to base coordinates: p is where the reference point is, R the rotation.",
         f"Task: {' '.join(mechanism.task)}."
@@ -307,10 +368,10 @@ def _header(machine: Machine, made: Translated, parts: Sequence[str], path: Join
         "All of it in the working mode of home: each crank and carriage on the side where it is there.",
         "",
         "The tables are of this machine; of the functions, what it never needs is left out.",
-        "Include it with PFK_DECLARATIONS_ONLY defined for the declarations alone; with PFK_SELF_TEST defined it is a",
-        "program that checks itself:",
+        "With PFK_SELF_TEST defined it is a program that checks itself:",
         "    cc -std=c99 -D PFK_SELF_TEST FILE -lm -o check && ./check",
         "",
+        *steps_in_words(machine, tables, parts),
         "actuator  joint                 home",
     ]
     for place, (name, driven) in enumerate(zip(mechanism.actuator_names, machine.driven, strict=True)):

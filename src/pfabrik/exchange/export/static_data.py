@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ...to_c import Unsupported
+from ...to_c.values import c_name
 from .machine_data import Number
 
 Precision = Literal["double", "float"]
@@ -86,53 +87,139 @@ def fields_read(text: str) -> set[str]:
 
 
 class StaticData:
-    """Static data of a file: tables are constants, all other arrays memory of calls.
+    """The tables of a file as constants, and the memory of its calls: the members of a struct, and what fills it.
 
     Parameters
     ----------
     program : the translated program.
-    text : the translated program: arrays, and fields of records, that it does not read are left out.
+    text : the translated program: fields of records that it does not read are left out.
     size : bytes of a real number.
     """
 
     def __init__(self, program: Any, text: str, size: int) -> None:
         self._program, self._size = program, size
         self._fields = fields_read(text)
-        self.n_constant = self.n_memory = 0  # bytes
+        self.n_constant = self.n_memory = 0  # bytes, on 32 bits
         self._arrays: dict[int, tuple[str, Any]] = {}  # by identity, with the array, so that it stays alive
-        self.lines = ["static double pfk_nothing[1]; /* where there are no numbers */"]
+        self._structs: dict[str, str] = {}  # names of constant ones by their type and text
+        self.lines = ["static const pfk_real pfk_nothing[1] = {0.0}; /* where there are no numbers */"]
+        self.members: list[str] = []
+        self.filling: list[str] = []
+        self.places: list[str] = []  # of pointers to the memory's own arrays, and of these
 
-    def constants(self, name: str, value: Any) -> None:
-        """Write the arrays of a NamedTuple as constants."""
-        for path, array in _arrays(name, value):
-            self._put(path, array, is_constant=True)
+    def constants(self, name: str, owner: Any, *fields: str) -> None:
+        """Write the arrays in some fields of a NamedTuple as constants."""
+        for field in (each for each in self._program.spell.members(type(owner)) if each in fields):
+            for path, array in self._read_in(f"{name}.{field}", getattr(owner, field)):
+                if place := self._taken(f"pfk_{path.replace('.', '_')}", path, array):
+                    self.lines.append(self._constant(place, array))
 
-    def variable(self, name: str, value: tuple[Any, ...]) -> None:
+    def memory(self, name: str, value: tuple[Any, ...]) -> None:
         """Write a NamedTuple; its arrays that are no constants are memory."""
-        for path, array in _arrays(name, value):
-            self._put(path, array, is_constant=False)
+        for path, array in self._read_in(name, value):
+            own = path.replace(".", "_")
+            if not self._taken(f"memory->{own}", path, array):
+                continue
+            kept = self._kept(array)
+            self.n_memory += self._bytes(kept)
+            self.members.append(f"    {self._element(array)} {own}[{array.size}];")
+            if any(np.any(kept[field]) for field in kept.dtype.names or [()]):
+                self.lines.append(self._constant(f"pfk_first_{own}", array))
+                turns = f"for (i = 0; i < {array.size}; ++i)"
+                self.filling.append(f"    {turns}\n        memory->{own}[i] = pfk_first_{own}[i];")
+        self.members.append(f"    {self._program.spell.value(self._program.type_of(value))} {name};")
+        self._fill(f"memory->{name}", name, value)
+
+    def _fill(self, place: str, path: str, value: tuple[Any, ...]) -> None:
+        """Statements that fill a NamedTuple in the memory; what is nothing is zero already."""
+        for name in self._program.spell.members(type(value)):
+            key, item, at = (type(value).__name__, name), getattr(value, name), f"{place}.{c_name(name)}"
+            if key in self._program.layout.constant:
+                self._assign(at, f"&{self._struct(f'{path}.{name}', item)}")
+            elif isinstance(item, tuple):
+                self._fill(at, f"{path}.{name}", item)
+            elif not isinstance(item, np.ndarray):
+                self._assign(at, self._scalar(item))
+            elif key in self._program.layout.shapes:
+                self._assign(at, self._pointer(item))
+            else:
+                self._assign(f"{at}.data", self._pointer(item))
+                for k in range(item.ndim):
+                    self._assign(f"{at}.n[{k}]", str(item.shape[k]))
+
+    def _assign(self, place: str, text: str) -> None:
+        self.n_memory += 4
+        if text.startswith("memory->"):
+            own, array = (each.removeprefix("memory->") for each in (place, text))
+            self.places.append(f"    PFK_PLACES({own}, {array})")
+        else:
+            self.filling.append(f"    {place} = {text};")
+
+    def _struct(self, path: str, value: tuple[Any, ...]) -> str:
+        """The name of a constant NamedTuple."""
         kind = self._program.spell.value(self._program.type_of(value))
-        self.lines.append(f"static const {kind} pfk_{name} = {self._made(value)};")
-
-    def _is_read(self, path: str) -> bool:
-        return all(f"{field}_" in self._fields or field in self._fields for field in path.split(".")[1:])
-
-    def _put(self, path: str, array: Any, *, is_constant: bool) -> None:
-        if id(array) in self._arrays or not array.size or not self._is_read(path):
-            return
+        text = self._made(path, value, "    ")
         name = f"pfk_{path.replace('.', '_')}"
-        self._arrays[id(array)] = name, array
-        element = self._element(array)
+        known = self._structs.setdefault(f"{kind} {text}", name)
+        if known == name:
+            self.lines.append(f"static const {kind} {name} = {text};")
+        return known
+
+    def _made(self, path: str, value: tuple[Any, ...], indent: str) -> str:
+        """The initialiser of a constant NamedTuple, a line for each field."""
+        lines = []
+        for name in self._program.spell.members(type(value)):
+            key, item = (type(value).__name__, name), getattr(value, name)
+            if key in self._program.layout.constant:
+                text = f"&{self._struct(f'{path}.{name}', item)}"
+            elif isinstance(item, tuple):
+                text = self._made(f"{path}.{name}", item, f"{indent}    ")
+            elif not isinstance(item, np.ndarray):
+                text = self._scalar(item)
+            elif key in self._program.layout.shapes:
+                text = self._pointer(item)
+            else:
+                text = f"{{{self._pointer(item)}, {{{', '.join(map(str, item.shape))}}}}}"
+            lines.append(f"{indent}{text}")
+        return "{\n" + ",\n".join(lines or [f"{indent}0"]) + f"\n{indent[4:]}}}"
+
+    def _scalar(self, value: Any) -> str:
+        return literal(value) if isinstance(value, float) else str(int(value))
+
+    def _read_in(self, path: str, value: Any) -> Iterator[tuple[str, Any]]:
+        """Arrays in a NamedTuple that are read, with the names that lead there."""
+        if isinstance(value, np.ndarray):
+            yield path, value
+        elif isinstance(value, tuple):
+            for name in self._program.spell.members(type(value)):
+                yield from self._read_in(f"{path}.{name}", getattr(value, name))
+
+    def _is_read(self, field: str) -> bool:
+        return f"{field}_" in self._fields or field in self._fields
+
+    def _taken(self, place: str, path: str, array: Any) -> str:
+        """Where an array is from now on; nothing if it has a place, or needs none."""
+        if id(array) in self._arrays or not array.size:
+            return ""
+        self._arrays[id(array)] = place, array
         self._require_fitting(path, array)
-        if read := [field for field in array.dtype.names or () if self._is_read(f".{field}")]:
-            array = array[read]
+        return place
+
+    def _kept(self, array: Any) -> Any:
+        """An array with the fields of its records that are read."""
+        read = [field for field in array.dtype.names or () if self._is_read(field)]
+        return array[read] if read else array
+
+    def _bytes(self, array: Any) -> int:
         fields = [array.dtype[field] for field in array.dtype.names or ()] or [array.dtype]
-        size = array.size * sum(each.itemsize // 8 * (self._size if each.base.kind == "f" else 4) for each in fields)
-        self.n_constant, self.n_memory = self.n_constant + is_constant * size, self.n_memory + (not is_constant) * size
-        qualifier = "static const" if is_constant else "static"
-        is_zero = not is_constant and not any(np.any(array[field]) for field in array.dtype.names or [()])
-        declared = f"{qualifier} {element} {name}[{array.size}]"
-        self.lines.append(f"{declared};" if is_zero else f"{declared} = {{\n{_values(array)}\n}};")
+        sizes = [each.itemsize // 8 * (self._size if each.base.kind == "f" else 4) for each in fields]
+        return int(array.size * sum(sizes))
+
+    def _constant(self, name: str, array: Any) -> str:
+        """An array as a constant."""
+        kept = self._kept(array)
+        self.n_constant += self._bytes(kept)
+        return f"static const {self._element(array)} {name}[{array.size}] = {{\n{_values(kept)}\n}};"
 
     def _require_fitting(self, path: str, array: Any) -> None:
         fields = [array[name] for name in array.dtype.names or ()] or [array]
@@ -143,23 +230,9 @@ class StaticData:
     def _element(self, array: Any) -> str:
         return str(self._program.spell.value(self._program.type_of(array).element))
 
-    def _made(self, value: Any) -> str:
-        if isinstance(value, tuple):
-            return "{" + ", ".join(map(self._made, value)) + "}"
-        if not isinstance(value, np.ndarray):
-            return literal(value) if isinstance(value, float) else str(int(value))
-        sizes = ", ".join(map(str, value.shape))
-        known = self._arrays.get(id(value))
-        element = self._element(value)
-        return f"{{({element} *){'pfk_nothing' if known is None else known[0]}, {{{sizes}}}}}"
-
-
-def _arrays(path: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Arrays in a NamedTuple, with the names that lead there."""
-    if isinstance(value, np.ndarray):
-        yield path, value
-    for field, item in zip(getattr(value, "_fields", ()), value, strict=False):
-        yield from _arrays(f"{path}.{field}", item)
+    def _pointer(self, array: Any) -> str:
+        place = self._arrays[id(array)][0] if id(array) in self._arrays else "pfk_nothing"
+        return place if place.startswith("memory->") else f"({self._element(array)} *){place}"
 
 
 def _values(array: Any) -> str:

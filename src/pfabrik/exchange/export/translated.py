@@ -16,11 +16,12 @@ from ...kernels.controller.driven import put_exerted
 from ...kernels.controller.joints_in_series import put_joints, walk
 from ...kernels.controller.projected import project_target
 from ...kernels.controller.rates import put_rates
-from ...kernels.controller.reached import measure, put_bodies, put_reached, put_turns, reach, rest
+from ...kernels.controller.reached import measure, put_bodies, put_reached, put_turns, reach, rest, stretched_leg
 from ...kernels.legs import records as K
 from ...kernels.pose.search_records import SETTINGS
 from ...kernels.pose.tables import MACHINE
 from ...to_c import Program
+from ...to_c.types import Layout
 from .controller_tables import ASKED, ControllerTables
 from .static_data import Precision, StaticData, fields_read
 
@@ -69,15 +70,53 @@ NOT_CONSTANT = ("Starts",)
 class Translated(NamedTuple):
     """The kernels of a file, its static data, and their bytes with integers of four."""
 
+    types: str  # of the memory of calls, and this
     kernels: str
-    data: str
+    data: str  # constants
+    filling: str  # statements that fill the memory
     constants: int
     memory: int
 
 
 def translated(tables: ControllerTables, conditions: set[str], precision: Precision) -> Translated:
-    """The kernels that a file needs, and its static data."""
-    program = Program(precision, INTEGER, _facts(tables), _everywhere(SINGLE) if precision == "float" else {})
+    """The kernels that a file needs, and its static data.
+
+    Values of tables that nothing reads are no facts, and without them less is read: so until nothing more is left out.
+    """
+    tolerances = _everywhere(SINGLE) if precision == "float" else {}
+    facts: dict[tuple[str, str], set[int]] = {}
+    layout, loose = Layout(), set[tuple[str, str]]()
+    while True:
+        facts |= _facts(tables, layout.fields)
+        program = Program(precision, INTEGER, facts, tolerances, layout)
+        used = _translation(program, tables, conditions)
+        fields = program.fields_read(program.text(used))
+        views = layout.views | {key for key, shapes in program.given.items() if len(shapes) > 1}
+        if fields == layout.fields and not program.of_other_shapes and views == layout.views:
+            break
+        loose |= program.of_other_shapes if fields == layout.fields else set()
+        known = {**layout.shapes, **_shapes(tables, fields)}
+        shapes = {key: shape for key, shape in known.items() if key not in loose}
+        layout = Layout(fields, shapes, _constant(tables, fields), views)
+    whole = program.text(used)
+    data = _data(tables, program, whole, precision)
+    read, members = fields_read(whole), "\n".join(data.members)
+    types = {name: text for name, text in program.needed(members).items() if TYPE.match(text)}
+    kernels = {name: text for name, text in program.needed(used).items() if name not in types}
+    told = 20 + (len(tables.reaching.near.driven) + 1) * (8 if precision == "double" else 4)
+    memory = f"{MEMORY}typedef struct {{\n{members}\n{TOLD}}} pfk_memory;\n"
+    return Translated(
+        OWN_INTEGER + _own_types(_prefixed(_without_unread("\n".join(types.values()), read) + memory, program)),
+        _own(_prefixed(_without_unread("\n".join([*program.head, *kernels.values()]), read), program)),
+        _prefixed("\n".join([*data.lines, PLACES, ",\n".join(data.places), "};"]), program),
+        _prefixed("\n".join(data.filling), program) + "\n",
+        data.n_constant,
+        data.n_memory + told,
+    )
+
+
+def _translation(program: Program, tables: ControllerTables, conditions: set[str]) -> str:
+    """Add the kernels that a file needs to a program; C text with their names."""
     matrix, row, number = np.zeros((0, 0)), np.zeros(0), 0
     reaching, assembling = tables.reaching, tables.assembling
     calls: list[tuple[str, Any, tuple[Any, ...]]] = [
@@ -92,7 +131,8 @@ def translated(tables: ControllerTables, conditions: set[str], precision: Precis
         ("JOINTS", walk, (tables.series, row)),
         ("TO_JOINTS", put_joints, (tables.series, assembling, reaching, row, row)),
         ("EFFORT", put_exerted, (tables.driving, reaching, matrix, row, row, row, row)),
-        ("NEAREST", project_target, (tables.projecting, reaching, matrix, matrix, row, number, number)),
+        ("NEAREST", stretched_leg, (reaching.near, reaching.scratch)),
+        ("NEAREST", project_target, (tables.projecting, reaching, matrix, matrix, row, number, number, number)),
     ]
     names = []
     for condition, kernel, samples in calls:
@@ -100,11 +140,7 @@ def translated(tables: ControllerTables, conditions: set[str], precision: Precis
             made = program.add(kernel, *samples)
             assert made.name == kernel.__name__ and not made.allocates, made.name
             names.append(made.name)
-    used = f"int {', '.join(names)};\n"
-    text = _without_unread(program.text(used).removesuffix(used))
-    data = _data(tables, program, text, precision)
-    lines = _prefixed("\n".join(data.lines), program)
-    return Translated(_own(_prefixed(text, program)), lines, data.n_constant, data.n_memory)
+    return f"int {', '.join(names)};\n"
 
 
 def _everywhere(tolerances: dict[tuple[str, str], float]) -> dict[tuple[str, str], float]:
@@ -119,11 +155,11 @@ def _everywhere(tolerances: dict[tuple[str, str], float]) -> dict[tuple[str, str
     }
 
 
-def _facts(tables: ControllerTables) -> dict[tuple[str, str], set[int]]:
-    """Values of the integers in the tables, and lengths of arrays."""
+def _facts(tables: ControllerTables, fields: frozenset[tuple[str, str]] | None) -> dict[tuple[str, str], set[int]]:
+    """Values of the integers in the tables, and lengths of arrays: of those in the fields that are read, if known."""
     facts: dict[tuple[str, str], set[int]] = {}
     names = Program().records
-    for value in _parts(tables):
+    for value in _parts(tables, fields):
         for field, item in zip(value._fields, value, strict=True):
             if isinstance(item, np.ndarray) and type(value).__name__ not in NOT_CONSTANT:
                 facts.setdefault((type(value).__name__, field), set()).add(len(item))
@@ -139,17 +175,29 @@ def _facts(tables: ControllerTables) -> dict[tuple[str, str], set[int]]:
     return facts
 
 
-def _parts(value: Any) -> Iterator[Any]:
-    """A NamedTuple and those in it."""
+def _shapes(
+    tables: ControllerTables, fields: frozenset[tuple[str, str]] | None
+) -> dict[tuple[str, str], tuple[int, ...]]:
+    """The shapes of arrays that are the same in every NamedTuple of the tables that has them."""
+    shapes: dict[tuple[str, str], set[tuple[int, ...]]] = {}
+    for value in _parts(tables, fields):
+        for field, item in zip(value._fields, value, strict=True):
+            if isinstance(item, np.ndarray) and type(value).__name__ not in NOT_CONSTANT:
+                shapes.setdefault((type(value).__name__, field), set()).add(item.shape)
+    return {key: known.pop() for key, known in shapes.items() if len(known) == 1}
+
+
+def _parts(value: Any, fields: frozenset[tuple[str, str]] | None) -> Iterator[Any]:
+    """A NamedTuple and those in its fields that are read, in all if it is not known which."""
     if isinstance(value, tuple):
         yield value
-        for item in value:
-            yield from _parts(item)
+        for name in type(value)._fields:  # type: ignore[attr-defined]
+            if fields is None or isinstance(value, ControllerTables) or (type(value).__name__, name) in fields:
+                yield from _parts(getattr(value, name), fields)
 
 
-def _without_unread(text: str) -> str:
-    """C text without the fields of records that it does not read."""
-    read = fields_read(text)
+def _without_unread(text: str, read: set[str]) -> str:
+    """C text without the fields of records that are not read."""
 
     def shortened(struct: re.Match[str]) -> str:
         fields = re.sub(r"    \w+ (\w+).*\n", lambda field: field[0] if field[1] in read else "", struct[1])
@@ -159,35 +207,70 @@ def _without_unread(text: str) -> str:
     return re.sub(rf"typedef struct \{{\n([^{{}}]*)\}} (?:{records});\n", shortened, text)
 
 
+LINKS = ("motions", "numbers", "sizes", "home", "bodies", "pairs", "least")
+"""What is constant of links, as far as they have it."""
+
+
+def _constants(tables: ControllerTables) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
+    """What is constant of the tables: NamedTuples by their place, and their fields."""
+    reaching, projecting, driving = tables.reaching, tables.projecting, tables.driving
+    yield "reaching", reaching, ("near", "far", "whole_near", "whole_far", "home", "ways", "tilt")
+    yield "reaching.links", reaching.links, LINKS
+    if tables.assembling is not None:
+        yield "assembling", tables.assembling, ("stays", "seeds")
+    if tables.series is not None:
+        yield "series", tables.series, ("motions", "end", "home", "units", "length")
+    if driving is not None:
+        yield "driving.moving", driving.moving, tuple(each for each in driving.moving._fields if each != "gravity")
+        yield "driving", driving, ("numbers", "axes", "tilts", "units")
+    if projecting is not None:
+        own, plan = projecting.tables, projecting.tables.plan
+        yield "projecting.tables", own, tuple(each for each in own._fields if each != "plan")
+        yield "projecting.tables.plan", plan, tuple(each for each in plan._fields if each != "links")
+        yield "projecting.tables.plan.links", plan.links, LINKS
+
+
+def _arrays_in(value: Any) -> Iterator[Any]:
+    """All arrays in a NamedTuple."""
+    if isinstance(value, tuple):
+        for item in value:
+            yield from _arrays_in(item)
+    elif isinstance(value, np.ndarray):
+        yield value
+
+
+def _read_of(value: Any, fields: frozenset[tuple[str, str]]) -> list[Any]:
+    """The arrays of a NamedTuple, without those in it, that are read."""
+    names = [name for name in value._fields if (type(value).__name__, name) in fields]
+    return [getattr(value, name) for name in names if isinstance(getattr(value, name), np.ndarray)]
+
+
+def _constant(tables: ControllerTables, fields: frozenset[tuple[str, str]]) -> frozenset[tuple[str, str]]:
+    """Fields that are NamedTuples of constants wherever they are."""
+    known = {
+        id(array)
+        for _, owner, names in _constants(tables)
+        for name in names
+        for array in _arrays_in(getattr(owner, name, ()))
+    }
+    found: dict[tuple[str, str], bool] = {}
+    for value in _parts(tables, fields):
+        for name, item in zip(type(value)._fields, value, strict=True):
+            if isinstance(item, tuple) and not isinstance(value, ControllerTables):
+                read = [array for part in _parts(item, fields) for array in _read_of(part, fields)]
+                is_constant = all(id(array) in known or not array.size for array in read)
+                key = type(value).__name__, name
+                found[key] = found.get(key, True) and is_constant
+    return frozenset(key for key, is_constant in found.items() if is_constant)
+
+
 def _data(tables: ControllerTables, program: Program, text: str, precision: Precision) -> StaticData:
     data = StaticData(program, text, 8 if precision == "double" else 4)
-    reaching, projecting = tables.reaching, tables.projecting
-    for name in ("near", "far", "whole_near", "whole_far", "home", "ways", "tilt"):
-        data.constants(f"reaching.{name}", getattr(reaching, name))
-    for name in ("motions", "numbers", "sizes", "home", "bodies", "pairs", "least"):
-        data.constants(f"reaching.links.{name}", getattr(reaching.links, name))
-    if tables.assembling is not None:
-        data.constants("assembling.stays", tables.assembling.stays)
-        data.constants("assembling.seeds", tables.assembling.seeds)
-    if tables.series is not None:
-        for name in ("motions", "end", "home", "units", "length"):
-            data.constants(f"series.{name}", getattr(tables.series, name))
-    if tables.driving is not None:
-        for name in (each for each in tables.driving.moving._fields if each != "gravity"):
-            data.constants(f"driving.moving.{name}", getattr(tables.driving.moving, name))
-        for name in ("numbers", "axes", "tilts", "units"):
-            data.constants(f"driving.{name}", getattr(tables.driving, name))
-    if projecting is not None:
-        own = projecting.tables
-        groups = ("projecting.tables", own), ("projecting.tables.plan", own.plan)
-        for place, group in groups:
-            for name in (each for each in group._fields if each not in ("plan", "links")):
-                data.constants(f"{place}.{name}", getattr(group, name))
-        for name in ("sizes", "home", "bodies", "pairs", "least"):
-            data.constants(f"projecting.tables.plan.links.{name}", getattr(own.plan.links, name))
+    for place, owner, names in _constants(tables):
+        data.constants(place, owner, *names)
     for name, value in zip(tables._fields, tables, strict=True):
         if value is not None:
-            data.variable(name, value)
+            data.memory(name, value)
     return data
 
 
@@ -217,13 +300,41 @@ OWN_INTEGER = f"""\
 #define PFK_INTEGER {INTEGER} /* int32_t computes on any machine what a controller of 32 bits does */
 #endif
 typedef PFK_INTEGER pfk_integer;
+
 """
+
+TOLD = """\
+    pfk_real actuators[PFK_ACTUATORS]; /* of the last answer */
+    int most_steps; /* of all searches of a call of pfk_nearest, and of pfk_fk: for its owner to set; 0: no bound */
+    pfk_told told;
+"""
+
+PLACES = """\
+/* Where pointers are in the memory, and the arrays that they are to. */
+enum { PFK_UNIT = sizeof(void *) < 4 ? 1 : 4 };
+#define PFK_PLACES(pointer, array) \\
+    {(uint16_t)(offsetof(pfk_memory, pointer) / PFK_UNIT), (uint16_t)(offsetof(pfk_memory, array) / PFK_UNIT)}
+typedef char pfk_has_places[sizeof(pfk_memory) / PFK_UNIT <= UINT16_MAX ? 1 : -1];
+static const uint16_t pfk_places[][2] = {"""
+
+TYPE = re.compile(r"(/\*(.(?!\*/))*.\*/\n)?typedef ", re.DOTALL)
+"""How the declaration of a type begins."""
+
+MEMORY = """\
+/* The memory of the calls of a machine, which `pfk_begin` fills: one for each machine, and for each thread or interrupt
+   that calls. What `told` says of the last call is for its owner; the rest is of no interest to others. */
+"""
+
+
+def _own_types(text: str) -> str:
+    """Declarations of a file without what describes kernels."""
+    return re.sub(r"/\* (?!The memory of the calls)[^*]*\*/\n", "", text)
 
 
 def _own(text: str) -> str:
     """Kernels as part of a file in C and C++."""
     text = re.sub(r"(?m)^typedef \w+ pfk_real;\n", "", text)
-    text = text.replace(f"typedef {INTEGER} pfk_integer;\n", OWN_INTEGER)
+    text = text.replace(f"typedef {INTEGER} pfk_integer;\n", "")
     text = re.sub(r"(?m)^ *(\w+) = \1;\n", "", text)
     text = re.sub(r"/\* Memory of one call: .*?\n\}\n", "", text, flags=re.DOTALL)
     text = re.sub(r"\((pfk_\w+)\)\{", r"PFK_MADE(\1){", text)
@@ -245,7 +356,14 @@ def own_name(name: str) -> str:
 
 def _prefixed(text: str, program: Program) -> str:
     """C text with the prefix pfk in the names that it declares."""
-    names = {*program.items, *re.findall(r"(?m)^#define (\w+)", text), "real", "integer", "arena", "checked"}
+    names = {
+        *program.items,
+        *re.findall(r"(?m)^#define (\w+)", "\n".join(program.head)),
+        "real",
+        "integer",
+        "arena",
+        "checked",
+    }
     names -= {"take"} if "take" not in program.items else set()
     own = {name: own_name(name) for name in names}
     pieces = re.split(r"(/\*.*?\*/|^#include[^\n]*|^#error[^\n]*)", text, flags=re.DOTALL | re.MULTILINE)

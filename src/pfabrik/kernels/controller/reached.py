@@ -10,7 +10,7 @@ from ..legs.answer import Completion, complete_pose, deviation, place_legs, put_
 from ..legs.complete_poses import is_pose, load_pose, orthonormalise, put_pose, read_target, tilt_to, turn_pose
 from ..legs.frames import set_frames
 from ..legs.leg_constants import KEPT, LEAST_MARGIN
-from ..legs.records import Table
+from ..legs.records import SLIDE, Table
 from ..pose.equations import has_proximal, length_row
 from ..pose.limits import is_multiturn
 from ..pose.search_records import Starts
@@ -33,6 +33,9 @@ that what follows may go farther."""
 
 SHORTEST_SHARE = 1.0 / 32.0
 """The shortest step, as a share of the way."""
+
+MOST_PARTS = 66
+"""Most parts of a way of which the next is twice as long where legs close, and half as long where they do not."""
 
 UPRIGHT = 1e-6
 """Sine of the angle between a target's z axis and the only axis of tilt below which the target has no tilt."""
@@ -120,12 +123,32 @@ def place_whole(own: Reaching, pose: Floats) -> int:
     load_pose(pose, table.task[0]["length"], scratch.pose)
     orthonormalise(scratch.pose)
     copy_row(own.home.sides[0], scratch.sides)
+    return beyond(own, table) if closes(table, scratch) else LEG + 1 + open_leg(table, scratch)
+
+
+@routine
+def closes(table: Table, scratch: Completion) -> bool:
+    """Place legs at the pose of the scratch memory; True if all close, also those that are stretched to a dead point.
+
+    A pose that is nearest to a target out of reach is at dead points, where rounding decides if a leg reaches it.
+    """
     set_frames(scratch.pose, table.task[0], scratch.frames)
     singularity_margin, _ = place_legs(table.legs, scratch.frames, scratch.sides, scratch.values, scratch.lines)
     worst = put_rows(table.legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
-    if singularity_margin > LEAST_MARGIN * LEAST_MARGIN and worst <= NEARLY_CLOSED:
-        return beyond(own, table)
-    return LEG + 1 + open_leg(table, scratch)
+    if not worst <= NEARLY_CLOSED:
+        return False
+    return singularity_margin > LEAST_MARGIN * LEAST_MARGIN or are_stretched(table, scratch, singularity_margin)
+
+
+@routine
+def are_stretched(table: Table, scratch: Completion, singularity_margin: float) -> bool:
+    """True if cranks and carriages that are beyond a dead point end where their rods reach all the same."""
+    if not singularity_margin > -NEARLY_CLOSED:
+        return False
+    for k in range(table.legs.shape[0]):
+        if table.legs[k]["has_proximal"] == 1 and not abs(scratch.values[k, SLIDE]) <= NEARLY_CLOSED:
+            return False
+    return True
 
 
 @routine
@@ -210,7 +233,15 @@ def go(own: Reaching, table: Table, pose: Floats) -> int:
     """Complete `wanted` from a pose at once; a code."""
     if not read_target(own.wanted, pose, table.task[0], own.scratch.pose):
         return NO_POSE
-    return 0 if complete_pose(table, own.begin, own.scratch) else LEG + 1 + open_leg(table, own.scratch)
+    return close(own, table, own.begin)
+
+
+@routine
+def close(own: Reaching, table: Table, sides: Floats) -> int:
+    """Complete the pose of the scratch memory with legs on given sides (legs,); a code."""
+    if complete_pose(table, sides, own.scratch) or closes(table, own.scratch):
+        return 0
+    return LEG + 1 + open_leg(table, own.scratch)
 
 
 @routine
@@ -226,7 +257,7 @@ def lead(own: Reaching, table: Table, pose: Floats, from_home: bool) -> int:
         put_between(own, way, share)
         code = NO_POSE
         if read_target(own.step, own.present, task, own.scratch.pose):
-            code = 0 if complete_pose(table, own.sides, own.scratch) else LEG + 1 + open_leg(table, own.scratch)
+            code = close(own, table, own.sides)
         if code == 0:
             put_pose(own.scratch.pose, task["length"], own.present)
             copy_row(own.scratch.sides, own.sides)
@@ -255,15 +286,24 @@ def put_between(own: Reaching, way: float, share: float) -> None:
 @routine
 def open_leg(table: Table, scratch: Completion) -> int:
     """Index of the first leg that does not reach, else of the one that is farthest from closing."""
-    legs, frames, values, lines = table.legs, scratch.frames, scratch.values, scratch.lines
-    set_frames(scratch.pose, table.task[0], frames)
+    set_frames(scratch.pose, table.task[0], scratch.frames)
+    stretched = stretched_leg(table, scratch)
+    if stretched > 0:
+        return stretched - 1
+    put_rows(table.legs, scratch.frames, scratch.values, scratch.lines, scratch.rows)
+    return farthest_leg(table, scratch.rows)
+
+
+@routine
+def stretched_leg(table: Table, scratch: Completion) -> int:
+    """Number, from 1, of the first leg that is at a dead point or beyond, with frames placed; 0 if there is none."""
+    legs = table.legs
     for k in range(legs.shape[0]):
         n = k + 2 if legs[k]["orients"] == 1 else k + 1
-        singularity_margin, _ = place_legs(legs[:n], frames, scratch.sides, values, lines)
-        if not singularity_margin > LEAST_MARGIN * LEAST_MARGIN:
-            return k
-    put_rows(legs, frames, values, lines, scratch.rows)
-    return farthest_leg(table, scratch.rows)
+        margin, _ = place_legs(legs[:n], scratch.frames, scratch.sides, scratch.values, scratch.lines)
+        if not margin > LEAST_MARGIN * LEAST_MARGIN:
+            return k + 1
+    return 0
 
 
 @routine

@@ -57,7 +57,7 @@ class NewtonScratch(NamedTuple):
     best: PlatformState
     behind: PlatformState  # the last configuration of a continuation
     spheres: Spheres  # none if there are other equations
-    steps: Ints  # (1,): Newton steps taken
+    steps: Ints  # (2,): Newton steps taken, and the most to take; 0 if there is no bound
 
 
 def new_newton_scratch(table: Table, turns: bool) -> NewtonScratch:
@@ -92,7 +92,7 @@ def new_newton_scratch(table: Table, turns: bool) -> NewtonScratch:
         new_platform_state(n_legs),
         new_platform_state(n_legs),
         new_spheres(table),
-        np.zeros(1, np.int64),
+        np.zeros(2, np.int64),
     )
 
 
@@ -322,6 +322,8 @@ def newton(table: Table, assembled: float, stays: bool, scratch: NewtonScratch) 
     if has_spheres(scratch):
         set_spheres(table, scratch.values, scratch.state, scratch.leg_eval, scratch.spheres)
     for iteration in range(FORWARD_STEPS):
+        if scratch.steps[1] > 0 and scratch.steps[0] >= scratch.steps[1]:
+            return math.inf
         by_first = follows and iteration == 0
         if by_first and has_spheres(scratch):
             worst = put_sphere_errors(scratch.state.pose, scratch.spheres, scratch.equations)

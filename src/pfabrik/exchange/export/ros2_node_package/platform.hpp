@@ -94,12 +94,14 @@ struct Configuration
 };
 
 // What is commanded, and how that is from the target. Nothing is allocated after construction, and a call takes at most
-// steps x (starts + 2) steps of the search. Memory of the kinematics is static: one instance in a process, one thread.
+// steps x (starts + 2) steps of the search. One thread calls an instance.
 class Platform
 {
 public:
+  Platform(const Platform &) = delete;  // the memory of the kinematics is to where it is itself
   explicit Platform(const Settings & settings) : settings_(settings)
   {
+    @NAME@_begin(&memory_);
     @NAME@_home(&commanded_.pose);
     double home[kActuators];
     for (std::size_t i = 0; i < kActuators; ++i) {
@@ -180,7 +182,7 @@ public:
     if (code_ == @MACRO@_PROJECTED) {
       @NAME@_pose away = commanded_.pose;
       double unused[kActuators];
-      const int code = @NAME@_ik(&wanted, &away, unused);  // 0 where it is reached by way of home alone
+      const int code = @NAME@_ik(&memory_, &wanted, &away, unused);  // 0 where it is reached by way of home alone
       code_ = code == 0 ? code_ : code;
     }
     if (!is_reached && !(is_near && settings_.projects)) {
@@ -285,7 +287,8 @@ private:
   void put_limits()
   {
     std::fill(slack_.begin(), slack_.end(), kNaN);
-    resting_ = @NAME@_limits(&commanded_.pose, slack_.data());
+    resting_ = @NAME@_limits(&memory_, &commanded_.pose, slack_.data());
+    resting_ = resting_ == 0 && memory_.told.stretched > 0 ? @MACRO@_LEG + memory_.told.stretched : resting_;
     @MEASURE_LINKS@
     nearest_ = kLimits;
     double least = kInfinity;
@@ -332,7 +335,7 @@ private:
   // The joints of the description at a whole pose; as they were where that is none.
   void put_joints(Configuration & at)
   {
-    if (@NAME@_bodies(&at.pose, bodies_.data()) == @MACRO@_NO_POSE) {
+    if (@NAME@_bodies(&memory_, &at.pose, bodies_.data()) == @MACRO@_NO_POSE) {
       return;
     }
     for (std::size_t i = 0; i < kJoints; ++i) {
@@ -386,6 +389,7 @@ private:
   std::array<char, kLimits + 1> holding_{};
   std::array<double, kLimits + 1> slack_{};
   std::array<@NAME@_pose, kBodies> bodies_{};
+  @NAME@_memory memory_;
 };
 }  // namespace @NAME@_node
 

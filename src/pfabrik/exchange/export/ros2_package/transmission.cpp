@@ -69,14 +69,21 @@ void write_nothing(std::vector<H> & handles)
 }
 }  // namespace
 
+struct Kinematics
+{
+  @NAME@_memory memory;
+};
+
 Transmission::Transmission(
   const std::vector<std::string> & joint_names, const std::vector<std::string> & actuator_names,
   const std::vector<double> & actuator_reductions, const std::vector<double> & joint_offsets)
 : joint_names_(joint_names),
   actuator_names_(actuator_names),
   reductions_(actuator_reductions),
-  offsets_(joint_offsets)
+  offsets_(joint_offsets),
+  kinematics_(std::make_shared<Kinematics>())
 {
+  @NAME@_begin(&kinematics_->memory);
   if (
     joint_names_.size() != kJoints || offsets_.size() != kJoints || actuator_names_.size() != kActuators ||
     reductions_.size() != kActuators) {
@@ -127,7 +134,7 @@ bool Transmission::to_joints()
   for (std::size_t i = 0; i < kJoints; ++i) {
     joints[i] = at_[i];
   }
-  if ((code_ = @NAME@_to_joints(actuators, joints, nullptr)) != 0) {
+  if ((code_ = @NAME@_to_joints(&kinematics_->memory, actuators, joints, nullptr)) != 0) {
     return false;
   }
   for (std::size_t i = 0; i < kJoints; ++i) {
@@ -149,7 +156,7 @@ bool Transmission::to_actuators()
   for (std::size_t i = 0; i < kJoints; ++i) {
     joints[i] -= offsets_[i];
   }
-  if ((code_ = @NAME@_to_actuators(joints, actuators)) != 0) {
+  if ((code_ = @NAME@_to_actuators(&kinematics_->memory, joints, actuators)) != 0) {
     return false;
   }
   for (std::size_t i = 0; i < kJoints; ++i) {
@@ -180,7 +187,7 @@ void Transmission::actuator_to_joint()
     }
     if (!is_finite) {
       write_nothing(joint_velocity_);
-    } else if ((code_ = @NAME@_speeds_back(at_, of_actuators, of_joints)) == 0) {
+    } else if ((code_ = @NAME@_speeds_back(&kinematics_->memory, at_, of_actuators, of_joints)) == 0) {
       write(joint_velocity_, of_joints);
     }
   }
@@ -191,7 +198,7 @@ void Transmission::actuator_to_joint()
     }
     if (!is_finite) {
       write_nothing(joint_effort_);
-    } else if ((code_ = @NAME@_torques_back(at_, of_actuators, of_joints)) == 0) {
+    } else if ((code_ = @NAME@_torques_back(&kinematics_->memory, at_, of_actuators, of_joints)) == 0) {
       write(joint_effort_, of_joints);
     }
   }
@@ -211,7 +218,7 @@ void Transmission::joint_to_actuator()
   if (!joint_velocity_.empty()) {
     if (!read(joint_velocity_, of_joints)) {
       write_nothing(actuator_velocity_);
-    } else if ((code_ = @NAME@_speeds(at_, of_joints, of_actuators)) == 0) {
+    } else if ((code_ = @NAME@_speeds(&kinematics_->memory, at_, of_joints, of_actuators)) == 0) {
       for (std::size_t i = 0; i < kActuators; ++i) {
         of_actuators[i] *= reductions_[i];
       }
@@ -221,7 +228,7 @@ void Transmission::joint_to_actuator()
   if (!joint_effort_.empty()) {
     if (!read(joint_effort_, of_joints)) {
       write_nothing(actuator_effort_);
-    } else if ((code_ = @NAME@_torques(at_, of_joints, of_actuators)) == 0) {
+    } else if ((code_ = @NAME@_torques(&kinematics_->memory, at_, of_joints, of_actuators)) == 0) {
       for (std::size_t i = 0; i < kActuators; ++i) {
         of_actuators[i] /= reductions_[i];
       }

@@ -21,6 +21,8 @@ namespace @NAME@_transmission
 constexpr std::size_t kJoints = @N_JOINTS@;
 constexpr std::size_t kActuators = @N_ACTUATORS@;
 
+struct Kinematics;  // the memory of the exported C
+
 // Positions, velocities and efforts of the joints from those of the actuators, and back.
 //
 // Velocities and efforts are mapped at the positions of the joints: of this call, where there are handles for them,
@@ -54,6 +56,7 @@ private:
   std::vector<double> reductions_, offsets_;
   std::vector<transmission_interface::JointHandle> joint_position_, joint_velocity_, joint_effort_;
   std::vector<transmission_interface::ActuatorHandle> actuator_position_, actuator_velocity_, actuator_effort_;
+  std::shared_ptr<Kinematics> kinematics_;
   double at_[kJoints];
   int code_ = 0;
 };
