@@ -33,7 +33,7 @@ FARTHEST = (0.3, 0.5)
 """The largest distance of these poses from home [L, rad]."""
 
 N_TRIED = 400
-MOST_STEPS = 40
+STEPS_OF_CHECKS = 40
 """Most steps of the library's searches: answers that it reaches count, and of nearest poses that they are feasible; the
 search for the nearest of all takes a hundred times as long."""
 
@@ -102,7 +102,7 @@ def _reached_around_home(mechanism: Mechanism) -> tuple[Floats, Solution]:
 
 def _options(mechanism: Mechanism) -> Options:
     """What is asked of the library, in home's mode; some of its engines do not count steps."""
-    return Options(working_mode="keep", most_steps=MOST_STEPS if engine_of(mechanism).bounds_steps else None)
+    return Options(working_mode="keep", most_steps=STEPS_OF_CHECKS if engine_of(mechanism).bounds_steps else None)
 
 
 def _distances(solution: Solution) -> Floats:
