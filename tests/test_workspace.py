@@ -663,3 +663,11 @@ def test_a_map_that_explores_without_closed_forms_goes_round_an_obstacle() -> No
     assert np.median(distance) == pytest.approx(0.02 * length, abs=1e-3 * length)
     assert distance.max() < 0.07 * length  # a cell: the arm is redundant, and answers may have another elbow
     assert not found.contains([406.9, 100.0])
+
+
+@pytest.mark.parametrize("name", ["stewart", "rps", "prs", "tricept"])
+def test_a_workspace_without_an_end_is_refused_before_it_is_searched(name: str) -> None:
+    looked: list[int] = []
+    with pytest.raises(pf.errors.InvalidArgument, match="nothing ends the workspace"):
+        pf.workspace(pf.load(name).without_limits(), on_progress=lambda done, total: looked.append(done))
+    assert max(looked, default=0) < 10_000

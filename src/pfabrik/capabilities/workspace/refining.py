@@ -137,6 +137,7 @@ def _box(lattice: Lattice, width: int, reach: int) -> Cells:
     middle = np.clip(np.round(np.clip(0.0, first, last)), -farthest, farthest)  # the start, or what is nearest to it
     low = np.clip(np.floor(first) - 1, middle - reach, middle).astype(np.int64)
     high = np.clip(np.ceil(last) + 1, middle, middle + reach).astype(np.int64)
+    _refuse_rays(lattice, middle, width, int(farthest), reach)
     while True:
         axes = [np.arange(a, b + 1) * width for a, b in zip(low, high, strict=True)]
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
@@ -151,6 +152,22 @@ def _box(lattice: Lattice, width: int, reach: int) -> Cells:
         low, high = low - by * grow_low, high + by * grow_high
         if (high - low).max() > HORIZON * reach:
             _refuse_endless(lattice, int((high - low).argmax()))
+
+
+def _refuse_rays(lattice: Lattice, middle: Ints, width: int, farthest: int, reach: int) -> None:
+    """Refuse a workspace without an end along an axis: its box, which is looked at next, has many more points."""
+    for axis, along in enumerate(np.eye(lattice.d, dtype=np.int64)):
+        for sign in (-1, 1):
+            done = 0
+            while done < farthest:
+                ahead = np.arange(done + 1, min(max(2 * done, reach), farthest) + 1)
+                places = (middle.astype(np.int64) + sign * ahead[:, None] * along) * width
+                numbers = lattice.number(codes(places), width)
+                if not (lattice.margins[numbers] >= 0.0).all():
+                    break
+                done = int(ahead[-1])
+            else:
+                _refuse_endless(lattice, axis)
 
 
 def _refuse_endless(lattice: Lattice, axis: int) -> NoReturn:
