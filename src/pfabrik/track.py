@@ -136,7 +136,7 @@ def _kept_assembly(
     for row in range(crossed[0], len(targets)):  # the others were answered from a dead point, or beyond it
         target = targets[row : row + 1]
         answer = engine.answer(target, kept, options, keep_mode=True)
-        is_kept = ((assembly_signs(mechanism, answer.coordinates)[0] * signs > 0.0) | (signs == 0.0)).all()
+        is_kept = not are_opposite(assembly_signs(mechanism, answer.coordinates), signs)[0]
         if answer.rows.status[0] == REACHED and is_kept:
             kept = answer
         elif answer.rows.status[0] <= PROJECTED and not is_kept:

@@ -21,11 +21,11 @@ from ...common.arrays import Floats, Ints, Mask
 from ...common.derived import derived
 from ...common.printed import Printed, ResultTable, plain
 from ...tolerances import TOLERANCES
-from ..description.home_mobility import column_moves
+from ..description.home_mobility import column_joints, column_moves
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
-from .displacements import displacements
-from .loops import actuated_columns, loop_slopes
+from .displacements import displacements, joint_centres
+from .loops import actuated_columns, loop_slopes, present_screws
 from .mobility import around_home, generic_of
 
 KINDS = ("serial", "parallel", "constraint", "passive")
@@ -146,28 +146,46 @@ def assembly_signs(mechanism: Mechanism, q: Floats) -> Floats:
 
     At dead points and change points of a block the joints that follow from its loops may go on in either of two modes.
     Each block has a sign of its own, for that of a product stays where two change at once: that of det [C N; Z' 0],
-    with C its conditions in these joints, N the conditions that no joint breaks, as in a plane, and Z the turns of rods
-    about themselves. N and Z are signed as at home; the sign is 0 too where they have turned away too far for that.
-    No blocks where none is known.
+    with C its conditions in these joints, N the conditions that no joint breaks, as in a plane, and Z the spins of rods
+    between two balls. N is signed as at home, and the sign is 0 too where it has turned away too far for that; a spin
+    is signed by the line of its rod. No blocks where none is known.
     """
     blocks = loop_blocks(mechanism)
     if not len(blocks) or not len(q):
         return np.zeros((len(q), len(blocks)))
     invalid = np.asarray(np.isnan(q).any(axis=1))
     conditions = loop_slopes(mechanism, np.where(invalid[:, None], 0.0, q))
-    signs = [_sign_of(block, conditions) for block in blocks]
+    q = np.where(invalid[:, None], 0.0, q)
+    spins = _spins(mechanism, q, blocks)
+    signs = [_sign_of(block, conditions, own) for block, own in zip(blocks, spins, strict=True)]
     return np.asarray(np.where(invalid[:, None], 0.0, np.stack(signs, axis=1)))
 
 
-def _sign_of(block: LoopBlock, conditions: Floats) -> Floats:
+def _spins(mechanism: Mechanism, q: Floats, blocks: tuple[LoopBlock, ...]) -> list[Floats]:
+    """Of each block, the speeds of its rods' spins by its joint rates at coordinates q (n, c), (n, rods, columns)."""
+    if not any(block.rods for block in blocks):
+        return [np.zeros((len(q), 0, len(block.columns))) for block in blocks]
+    turns, centres = present_screws(mechanism, q)[:, :, :3], joint_centres(mechanism, q)
+    spins = []
+    for block in blocks:
+        own = np.zeros((len(q), len(block.rods), len(block.columns)))
+        for row, (one, other) in enumerate(block.rods):
+            line = centres[:, other] - centres[:, one]
+            is_of_ball = column_joints(mechanism)[block.columns] == one
+            own[:, row, is_of_ball] = np.einsum("nci,ni->nc", turns[:, block.columns[is_of_ball]], line)
+        spins.append(own)
+    return spins
+
+
+def _sign_of(block: LoopBlock, conditions: Floats, spins: Floats) -> Floats:
     """The sign of one block at loop conditions (n, 6 loops, c), (n,)."""
-    C, N, Z = _parts(conditions, block.rows, block.columns, block.kept.shape[1], block.idle.shape[1])
+    C, N, Z = _parts(conditions, block.rows, block.columns, block.kept.shape[1], len(block.rods))
     bordered = np.zeros((len(C), C.shape[1] + Z.shape[2], C.shape[2] + N.shape[2]))
     bordered[:, : C.shape[1], : C.shape[2]], bordered[:, : C.shape[1], C.shape[2] :] = C, N
     bordered[:, C.shape[1] :, : C.shape[2]] = np.swapaxes(Z, 1, 2)
-    alike = np.linalg.det(block.kept.T @ N), np.linalg.det(block.idle.T @ Z)
-    is_known = np.minimum(*np.abs(alike)) > TURNED_AWAY
-    return np.asarray(np.where(is_known, np.sign(np.linalg.det(bordered) * alike[0] * alike[1]), 0.0))
+    alike, along = np.linalg.det(block.kept.T @ N), np.linalg.det(spins @ Z)
+    signed = np.sign(np.linalg.det(bordered)) * np.sign(alike) * np.sign(along)
+    return np.asarray(np.where(np.abs(alike) > TURNED_AWAY, signed, 0.0))
 
 
 def _parts(conditions: Floats, rows: Ints, columns: Ints, n_kept: int, n_idle: int) -> tuple[Floats, Floats, Floats]:
@@ -191,13 +209,13 @@ class LoopBlock(NamedTuple):
     ----------
     rows, columns : their conditions, and these joints, as of `loop_slopes`.
     kept : N at home, (rows, k): conditions that no joint of these loops breaks.
-    idle : Z at home, (columns, i): motions that move nothing else, as the turn of a rod between two balls.
+    rods : pairs of balls, by their places among the joints, of rods that spin.
     """
 
     rows: Ints
     columns: Ints
     kept: Floats
-    idle: Floats
+    rods: tuple[tuple[int, int], ...]
 
 
 @derived
@@ -215,7 +233,7 @@ def loop_blocks(mechanism: Mechanism) -> tuple[LoopBlock, ...]:
     is_on = np.abs(joints).max(axis=(0, 2)) > TOLERANCES.alignment  # (loops, joints)
     left, blocks = np.flatnonzero(is_on[:, passive].any(axis=1)), list[LoopBlock]()
     while len(left):
-        block = _next_block(conditions, is_on, left, passive)
+        block = _next_block(mechanism, conditions, is_on, left, passive)
         if block is None:
             return ()
         blocks.append(block)
@@ -223,35 +241,45 @@ def loop_blocks(mechanism: Mechanism) -> tuple[LoopBlock, ...]:
     return tuple(blocks) if not len(passive) else ()
 
 
-def _next_block(conditions: Floats, is_on: Mask, left: Ints, passive: Ints) -> LoopBlock | None:
+def _next_block(mechanism: Mechanism, conditions: Floats, is_on: Mask, left: Ints, passive: Ints) -> LoopBlock | None:
     """The smallest block of the loops that are left, whose joints are among those not yet placed."""
     for size in range(1, min(len(left), MOST_TOGETHER) + 1):
         for chosen in combinations(left.tolist(), size):
-            block = _block(conditions, is_on, np.array(chosen), passive)
+            block = _block(mechanism, conditions, is_on, np.array(chosen), passive)
             if block is not None:
                 return block
-    return _block(conditions, is_on, left, passive)
+    return _block(mechanism, conditions, is_on, left, passive)
 
 
-def _block(conditions: Floats, is_on: Mask, loops: Ints, passive: Ints) -> LoopBlock | None:
-    """The block of some loops, if they place all of their joints that are not placed yet, but for idle motions."""
+def _block(mechanism: Mechanism, conditions: Floats, is_on: Mask, loops: Ints, passive: Ints) -> LoopBlock | None:
+    """The block of some loops, if they place all of their joints that are not placed yet, but for the spins of rods."""
     columns = passive[is_on[loops][:, passive].any(axis=0)]
     rows = (6 * loops[:, None] + np.arange(6)).ravel()
-    C = conditions[:, rows][:, :, columns]
-    ranks = np.linalg.matrix_rank(C, tol=TOLERANCES.alignment)
-    rank = int(ranks.max(initial=0))
-    _, kept, idle = _parts(conditions, rows, columns, len(rows) - rank, len(columns) - rank)
-    if np.abs(conditions[:, :, columns] @ idle)[ranks == rank].max(initial=0.0) > TOLERANCES.alignment:
-        return None  # other loops hold what these leave free
-    regular = int((ranks == rank).argmax())
-    return LoopBlock(rows, columns, kept[regular], idle[regular])
+    ranks = np.linalg.matrix_rank(conditions[:, rows][:, :, columns], tol=TOLERANCES.alignment)
+    rank, rods = int(ranks.max(initial=0)), _rods(mechanism, columns)
+    if len(rods) != len(columns) - rank:
+        return None  # not as many joints as conditions
+    kept = _parts(conditions, rows, columns, len(rows) - rank, 0)[1]
+    return LoopBlock(rows, columns, kept[int((ranks == rank).argmax())], rods)
+
+
+def _rods(mechanism: Mechanism, columns: Ints) -> tuple[tuple[int, int], ...]:
+    """Pairs of balls, by their places among the joints, that alone hold a body, among the joints of some columns."""
+    places = np.unique(column_joints(mechanism)[columns]).tolist()
+    rods = []
+    for body in mechanism.bodies:
+        ends = [place for place, joint in enumerate(mechanism.joints) if body in joint.connects]
+        are_balls = all(mechanism.joints[place].type == "spherical" for place in ends)
+        if len(ends) == 2 and are_balls and set(ends) <= set(places) and body != mechanism.end_effector_body:
+            rods.append((ends[0], ends[1]))
+    return tuple(rods)
 
 
 AS_FORCES = 0.1
 """Scale of lengths, so that forces count for more in N than their moments, which turn as the points of balls move."""
 
 TURNED_AWAY = 0.2
-"""Volume that N, or Z, spans with its directions at home, below which nothing is said of its sign."""
+"""Volume that N spans with its directions at home, below which nothing is said of its sign."""
 
 MOST_TOGETHER = 4
 """Most loops that are tried together before all that are left are."""
