@@ -65,3 +65,41 @@ def test_fingers_end_where_a_rod_is_in_line_with_its_crank(sides: int, balls: tu
     np.testing.assert_array_equal(there_and_back.status == Status.REACHED, [*expected, *expected[::-1]])
     pinned = [c.column for c in machine.coordinates if c.joint.type != "spherical"]  # rods between balls may turn
     np.testing.assert_allclose(there_and_back.q[-1][pinned], 0.0, atol=1e-9)
+
+
+def four_bar(kinds: tuple[str, str], pins: list[tuple[float, float]], driven: str) -> Mechanism:
+    """A crank, a coupler and a rocker in a plane; the coupler is on pins or balls, the crank is the end effector."""
+    bodies = ("base", "one"), ("one", "rod"), ("rod", "two"), ("base", "two")
+    joints = []
+    for name, kind, connects, (x, y) in zip("ABCD", ("revolute", *kinds, "revolute"), bodies, pins, strict=True):
+        axis = {"axis": Z, "actuated": name == driven} if kind == "revolute" else {}
+        joints.append(Joint(name, kind, connects, at=(x, y, 0), **axis))
+    return Mechanism("four-bar", joints, "one", (*pins[1], 0), task=("yaw",))
+
+
+PINNED, SPUN = ("revolute", "revolute"), ("spherical", "spherical")
+
+
+@pytest.mark.parametrize("kinds", [PINNED, SPUN, ("revolute", "spherical")])
+def test_a_drag_link_turns_fully(kinds: tuple[str, str]) -> None:
+    """Grashof: the ground is the shortest link, so there is no dead point, though the coupler turns far on balls."""
+    machine = four_bar(kinds, [(0, 0), (45, 0), (40, -20), (3, 6)], "A")
+    home = pf.solve_fk(machine, [0.0])
+    assert all(np.isinf(each.distance) for each in pf.travel(home, about=[Z, (0, 0, -1)]))
+    turns = pf.pose(np.zeros((18, 3)), rpy=np.radians(np.arange(0, 360, 20.0))[:, None] * np.array(Z))
+    turns[:, :3, 3] = turns[:, :3, :3] @ np.array(machine.reference_point)
+    assert (pf.solve_ik(machine, turns, start=home).status == Status.REACHED).all()
+    assert (pf.track(machine, turns, start=home).status == Status.REACHED).all()
+
+
+@pytest.mark.parametrize("driven", ["A", "D"])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in range(1, 20))])
+def test_balls_for_pins_change_no_travel(seed: int, driven: str) -> None:
+    """The oracle is the same four-bar on pins, whose signs are those of a determinant alone."""
+    rng = np.random.default_rng(seed)
+    for _ in range(6):
+        pins = [(0.0, 0.0), *map(tuple, rng.uniform(-60, 60, (3, 2)))]
+        machines = [four_bar(kinds, pins, driven) for kinds in (PINNED, SPUN)]
+        ends = [pf.travel(pf.solve_fk(machine, [0.0]), about=[Z, (0, 0, -1)]) for machine in machines]
+        pinned, spun = (np.array([each.distance for each in of_one]) for of_one in ends)
+        np.testing.assert_allclose(spun, pinned, atol=1e-4)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -104,10 +103,11 @@ def targets_of(machine: pf.Mechanism, n: int) -> Array:
 def ratios(kind: str, number: int, is_thick: bool, starts: int) -> Array:
     """Of targets that double precision does not reach, how many times as far from them single precision ends."""
     machine = drawn(kind, number, is_thick)
-    targets, ask = targets_of(machine, N_TARGETS), partial(said_by, starts=starts)
+    targets, n_actuators = targets_of(machine, N_TARGETS), len(machine.actuator_names)
     found: dict[Precision, Said] = {}
     for precision in ("double", "float"):
-        found[precision] = ask(compiled(c_source(machine, precision=precision, parts=PARTS)), targets)
+        program = compiled(c_source(machine, precision=precision, parts=PARTS))
+        found[precision] = said_by(program, targets, n_actuators, starts=starts)
     away = found["double"].codes != 0
     exact, rounded = (costs(machine, each.poses, targets) / machine.characteristic_length for each in found.values())
     assert (np.where(away, 0.0, rounded) <= FINEST).all()

@@ -19,7 +19,7 @@ import pytest
 
 from pfabrik.kernels._jit import SOURCES
 from pfabrik.to_c import Program, Unsupported
-from pfabrik.to_c.types import Layout
+from pfabrik.to_c.types import StructLayout
 from subset import constructs
 from subset.random_programs import Writer
 
@@ -291,7 +291,7 @@ def test_what_would_need_an_element_of_an_empty_array_is_left_out(tmp_path: Path
     made_of = imported(tmp_path / "facts.py", FACTS)
     own = made_of.Own(np.zeros(0), np.array([1.0, 0.0, 3.0]), np.zeros(4))
     shapes = {("Own", name): array.shape for name, array in own._asdict().items()}
-    program = Program(facts={("Own", "none"): {0}}, layout=Layout(shapes=shapes))
+    program = Program(facts={("Own", "none"): {0}}, layout=StructLayout(shapes=shapes))
     made = program.add(made_of.asked, own)
     text = program.text(f"int {made.name};\n")
     assert program.fields_read(text) == {("Own", "some"), ("Own", "out")}

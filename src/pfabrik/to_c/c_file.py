@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..kernels._jit import SOURCES
-from .types import INTEGER, REAL, Array, Layout, Spelling, Struct, Unsupported, type_of
+from .types import INTEGER, REAL, Array, Spelling, Struct, StructLayout, Unsupported, type_of
 from .values import RESERVED, Value, number
 
 PRELUDE = Path(__file__).with_name("prelude.h")
@@ -27,7 +27,7 @@ class File:
         integer: str,
         facts: dict[tuple[str, str], set[int]] | None,
         tolerances: dict[tuple[str, str], float] | None,
-        layout: Layout,
+        layout: StructLayout,
     ) -> None:
         self.real, self.integer, self.facts, self.tolerances = real, integer, facts or {}, tolerances or {}
         self.suffix = "f" if real == "float" else ""

@@ -11,7 +11,7 @@ from .c_file import File
 from .expressions import ANNOTATED
 from .flow import flow_of
 from .statements import Statements
-from .types import NOTHING, NUMBERS, Array, Layout, Unreachable, Unsupported
+from .types import NOTHING, NUMBERS, Array, StructLayout, Unreachable, Unsupported
 from .values import RESERVED, UNKNOWN, c_name, comment, comments_of, short_path, source_of, tree_of
 
 INDENTED: Any = {"initial_indent": "    ", "subsequent_indent": "    "}
@@ -123,7 +123,7 @@ class Program(File):
         integer: str = "int64_t",
         facts: dict[tuple[str, str], set[int]] | None = None,
         tolerances: dict[tuple[str, str], float] | None = None,
-        layout: Layout = Layout(),  # noqa: B008 - it has no state
+        layout: StructLayout = StructLayout(),  # noqa: B008 - it has no state
     ) -> None:
         super().__init__(real, integer, facts, tolerances, layout)
         self.functions: dict[Any, Function] = {}

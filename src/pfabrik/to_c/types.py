@@ -62,7 +62,7 @@ class Struct:
     items: tuple[Any, ...] = field(hash=False)  # long, and looked up at every call
 
 
-class Layout(NamedTuple):
+class StructLayout(NamedTuple):
     """How NamedTuples are structs of C; fields by the names of their class and of themselves."""
 
     fields: frozenset[tuple[str, str]] | None = None  # that are read: others are left out; all if None
@@ -122,7 +122,7 @@ class Spelling:
     def __init__(
         self,
         declare: Any,
-        layout: Layout,
+        layout: StructLayout,
     ) -> None:
         self.declare = declare  # takes a name and its text
         self.layout = layout

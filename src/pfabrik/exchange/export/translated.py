@@ -21,7 +21,7 @@ from ...kernels.legs import records as K
 from ...kernels.pose.search_records import SETTINGS
 from ...kernels.pose.tables import MACHINE
 from ...to_c import Program
-from ...to_c.types import Layout
+from ...to_c.types import StructLayout
 from .controller_tables import ASKED, ControllerTables
 from .static_data import Precision, StaticData, fields_read
 
@@ -85,7 +85,7 @@ def translated(tables: ControllerTables, conditions: set[str], precision: Precis
     """
     tolerances = _everywhere(SINGLE) if precision == "float" else {}
     facts: dict[tuple[str, str], set[int]] = {}
-    layout, loose = Layout(), set[tuple[str, str]]()
+    layout, loose = StructLayout(), set[tuple[str, str]]()
     while True:
         facts |= _facts(tables, layout.fields)
         program = Program(precision, INTEGER, facts, tolerances, layout)
@@ -97,7 +97,7 @@ def translated(tables: ControllerTables, conditions: set[str], precision: Precis
         loose |= program.of_other_shapes if fields == layout.fields else set()
         known = {**layout.shapes, **_shapes(tables, fields)}
         shapes = {key: shape for key, shape in known.items() if key not in loose}
-        layout = Layout(fields, shapes, _constant(tables, fields), views)
+        layout = StructLayout(fields, shapes, _constant(tables, fields), views)
     whole = program.text(used)
     data = _data(tables, program, whole, precision)
     read, members = fields_read(whole), "\n".join(data.members)
