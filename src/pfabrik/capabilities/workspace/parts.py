@@ -52,8 +52,8 @@ class Parts:
         return np.where(nearest >= 0, self.labels[nearest], -1)
 
     def reached(self, question: MapQuestion, points: Floats) -> Mask:
-        """Mask (n,) of points (n, d) within reach; where the map was grown, from near configurations too."""
-        if not question.is_grown:
+        """Mask (n,) of points (n, d) within reach; where these have many configurations, from near ones too."""
+        if not question.has_many_at_a_point:
             return np.asarray(question.measure(points)[0] >= 0.0)
         nearest = self._nearest(points)
         reached = question.look(points, self._known.at(nearest), False)[0] >= 0.0

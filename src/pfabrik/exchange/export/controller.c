@@ -58,7 +58,8 @@ typedef struct {
 
 #include "memory.h"
 
-/* Fill the memory of calls: before all others, and again where a machine begins anew at home. */
+/* Fill the memory of calls: before all others, which read what it points to, and again where a machine begins anew at
+   home. */
 void pfk_begin(pfk_memory *memory);
 /* The pose at home. */
 void pfk_home(pfk_pose *pose);

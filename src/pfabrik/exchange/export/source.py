@@ -348,6 +348,12 @@ def steps_in_words(machine: Machine, tables: ControllerTables, parts: Sequence[s
     yield ""
 
 
+SELF_TEST = (
+    "With PFK_SELF_TEST defined it is a program that checks itself:",
+    "    cc -std=c99 -D PFK_SELF_TEST FILE -lm -o check && ./check",
+)
+
+
 def _header(
     machine: Machine, made: Translated, tables: ControllerTables, parts: Sequence[str], path: JointPath | None
 ) -> str:
@@ -368,8 +374,7 @@ def _header(
         "All of it in the working mode of home: each crank and carriage on the side where it is there.",
         "",
         "The tables are of this machine; of the functions, what it never needs is left out.",
-        "With PFK_SELF_TEST defined it is a program that checks itself:",
-        "    cc -std=c99 -D PFK_SELF_TEST FILE -lm -o check && ./check",
+        *(SELF_TEST if "ik" in parts else []),
         "",
         *steps_in_words(machine, tables, parts),
         "actuator  joint                 home",

@@ -322,7 +322,8 @@ TYPE = re.compile(r"(/\*(.(?!\*/))*.\*/\n)?typedef ", re.DOTALL)
 
 MEMORY = """\
 /* The memory of the calls of a machine, which `pfk_begin` fills: one for each machine, and for each thread or interrupt
-   that calls. What `told` says of the last call is for its owner; the rest is of no interest to others. */
+   that calls. For its owner are `told`, what the last call says of itself, and `most_steps`, which bounds the steps of
+   a call where it is set, after `pfk_begin`, to more than 0; the rest is of no interest to others. */
 """
 
 
