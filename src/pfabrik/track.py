@@ -17,15 +17,13 @@ from .common.batch import put
 from .common.rotations import whole_turns
 from .common.telling import telling
 from .engines.engine import engine_of
-from .engines.joints.close import measure_configurations
 from .engines.joints.configurations import Configurations
 from .engines.joints.engine_contract import InverseEngine, OnProgress
-from .engines.kept_assembly import up_to_dead_point
+from .engines.kept_assembly import start_or_home, up_to_dead_point
 from .engines.targets import Target, as_targets, refuse_invalid
 from .errors import InvalidArgument, counted
 from .kernels.rows import PROJECTED, REACHED, Rows
 from .machine.description.mechanism import Mechanism
-from .machine.model import model_of
 from .machine.motion.singularities import are_opposite, assembly_signs
 from .options import Options, checked_options
 from .tolerances import TOLERANCES
@@ -121,8 +119,8 @@ def _kept_assembly(
     mechanism: Mechanism, targets: Floats, start: Configurations | None, solutions: Configurations, options: Options
 ) -> Configurations:
     """The solutions along targets (n, 4, 4); rows beyond a dead point of a linkage stop at it, on the start's side."""
-    engine, home = engine_of(mechanism), np.zeros((1, len(mechanism.coordinates)))
-    kept = start or engine.as_configurations(measure_configurations(model_of(mechanism), home))
+    engine = engine_of(mechanism)
+    kept = start_or_home(engine, mechanism, start)
     signs = assembly_signs(mechanism, kept.coordinates)[0]
     if not signs.any():
         return solutions

@@ -23,6 +23,14 @@ LEAST_STEP = 1e-13
 """Share of a way to which the dead point that it passes is found: rounding is near."""
 
 
+def start_or_home(engine: Engine, mechanism: Mechanism, start: Configurations | None) -> Configurations:
+    """A start, or the configuration at home where there is none."""
+    if start is not None:
+        return start
+    home = np.zeros((1, len(mechanism.coordinates)))
+    return engine.as_configurations(measure_configurations(model_of(mechanism), home))
+
+
 def within_assembly(
     engine: Engine,
     mechanism: Mechanism,
@@ -34,9 +42,7 @@ def within_assembly(
     """Answers to targets (n, 4, 4) from one start, home, or one for each; those beyond a dead point stop at it."""
     if not loop_blocks(mechanism):
         return answers
-    if start is None:
-        home = np.zeros((1, len(mechanism.coordinates)))
-        start = engine.as_configurations(measure_configurations(model_of(mechanism), home))
+    start = start_or_home(engine, mechanism, start)
     signs = assembly_signs(mechanism, start.coordinates)
     is_beyond = are_opposite(assembly_signs(mechanism, answers.coordinates), signs)
     for row in np.flatnonzero(is_beyond & (answers.rows.status <= PROJECTED)):

@@ -94,7 +94,7 @@ class Engine(InverseEngine):
         """Move as many configurations to targets (n, 4, 4) in their working modes; not REACHED where that fails."""
 
     def grower(self, counted: Counted) -> Grower | None:
-        """What grows known configurations, where this takes far less time than to answer targets anew."""
+        """Grower of known configurations; None where answering targets anew takes no longer."""
         return None
 
     def rested(self, answers: Configurations, start: Configurations | None) -> Configurations:

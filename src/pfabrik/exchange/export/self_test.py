@@ -1,4 +1,4 @@
-"""What the self-test of an exported file asks beside actuators at poses, and the library's answers."""
+"""Further questions of an exported file's self-test, beside actuators at poses, with the library's answers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ N_LOADED, WORST_CONDITION = 4, 50.0
 """Poses with torques or forces, and the largest condition number of the Jacobian there."""
 
 LED = 1e-11
-"""How far forward kinematics of the library may end from a pose that it is led to from home [L or entries]."""
+"""Distance within which forward kinematics from home must end at a pose for it to be asked [L or entries]."""
 
 LOAD = np.arange(1.0, 7.0)
 """The force and moment of torques; the twist, and its change, of forces."""

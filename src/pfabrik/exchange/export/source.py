@@ -101,7 +101,7 @@ def _reached_around_home(mechanism: Mechanism) -> tuple[Floats, Solution]:
 
 
 def _options(mechanism: Mechanism) -> Options:
-    """What is asked of the library, in home's mode; some of its engines do not count steps."""
+    """Options of the library's answers, in home's mode; some of its engines do not count steps."""
     return Options(working_mode="keep", most_steps=STEPS_OF_CHECKS if engine_of(mechanism).bounds_steps else None)
 
 
@@ -300,7 +300,7 @@ def rate_units(machine: Machine, path: JointPath | None) -> Floats:
 
 
 def _asked(machine: Machine, checks: Checks, conditions: set[str], precision: Precision) -> dict[str, list[str]]:
-    """What the self-test asks beside actuators, by its condition in `controller.c`; nothing where there is nothing."""
+    """Lines of the self-test's further questions, by their condition in `controller.c`; none where there are none."""
     asked: dict[str, list[str]] = {}
     if "NEAREST" in conditions and len((far := far_checks(machine, checks.targets)).targets):
         exact = f"#define PFK_EXACT_NEAREST {literal(NEAREST[precision])} /* of distances from targets [L] */"
