@@ -1,4 +1,4 @@
-"""A z-buffer: meshes as images of their faces, seen by an orthographic eye, and lines along the sides of pixels."""
+"""Meshes as images of their faces, seen by an orthographic eye, and lines along the sides of pixels."""
 
 from __future__ import annotations
 
@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from ..common.arrays import Floats, Ints, Mask
 from .crossings import cross
 
-AT_ONCE = 2_000_000
-"""Pixels that faces are tried at, at once: more would need much memory."""
-
 TALLEST = 1.5
 """Most pixels from below to above, as a multiple of those across."""
 
@@ -23,8 +20,9 @@ FLAT = 1e-12
 STEEPER = 4.0
 """Factor by which a jump in depth exceeds the steps beside it, at least: else it is a slope."""
 
-SMOOTHINGS, SPECK = 30, 7
-"""Times that corners of a line are moved towards their neighbours; sides of a loop below which it is a speck."""
+SMOOTH, SMOOTHINGS, SPECK = 2.0, 30, 7
+"""How far a line is smoothed along it [cells], by so many moves of its corners towards their neighbours at least; sides
+below which a line is a speck, where it is a loop or ends in nothing."""
 
 Node: TypeAlias = tuple[int, int]
 
@@ -86,6 +84,8 @@ def rasterised(seen: Floats, faces: Ints, width: int, margin: int = 2, *, both_s
     margin : free pixels around all faces.
     both_sides : True to draw faces that turn away from the eye too: those of a mesh that is not closed.
     """
+    from PIL import Image, ImageDraw
+
     used = seen[np.unique(faces), :2]
     low, span = used.min(axis=0), np.ptp(used, axis=0)
     pixel = float(max(span[0], span[1] / TALLEST)) / max(width - 2 * margin - 1, 1)
@@ -96,29 +96,22 @@ def rasterised(seen: Floats, faces: Ints, width: int, margin: int = 2, *, both_s
     area = cross(b - a, c - a)  # twice that on the screen; negative where a face turns away
     drawn = np.flatnonzero((np.abs(area) if both_sides else area) > FLAT)
     corners, area = placed[faces[drawn]], area[drawn]
-    first = np.ceil(corners[:, :, :2].min(axis=1)).astype(np.int64)
-    last = np.floor(corners[:, :, :2].max(axis=1)).astype(np.int64)
-    is_seen = (last >= first).all(axis=1)
-    sides = 1 << np.ceil(np.log2(np.maximum((last - first + 1).max(axis=1), 1))).astype(np.int64)
-    depth, face = np.full(rows * columns, -np.inf), np.full(rows * columns, -1)
-    for side in np.unique(sides[is_seen]).tolist():
-        offsets = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2)
-        members = np.flatnonzero(is_seen & (sides == side))
-        for block in np.split(members, range(AT_ONCE // side**2 + 1, len(members), AT_ONCE // side**2 + 1)):
-            at = first[block, None] + offsets
-            weights = _weights(corners[block, None], area[block, None], at)
-            row, place = np.nonzero((weights >= -1e-9).all(axis=-1))
-            pixels = at[row, place] @ [1, columns]
-            nearness = (weights[row, place] * corners[block[row], :, 2]).sum(axis=1)
-            np.maximum.at(depth, pixels, nearness)
-            is_nearest = nearness == depth[pixels]
-            face[pixels[is_nearest]] = block[row[is_nearest]]
-    weights, filled = np.zeros((rows * columns, 3)), np.flatnonzero(face >= 0)
-    at = np.stack(np.divmod(filled, columns)[::-1], axis=1)
-    weights[filled] = _weights(corners[face[filled]], area[face[filled]], at)
-    face[filled] = drawn[face[filled]]
-    shape = (rows, columns)
-    return Raster(face.reshape(shape), depth.reshape(shape), weights.reshape(*shape, 3), low, pixel)
+    image = Image.new("I", (columns, rows), -1)
+    polygon = ImageDraw.Draw(image).polygon
+    order, nodes = corners[:, :, 2].sum(axis=1).argsort(), np.round(corners[:, :, :2]).reshape(-1, 6)
+    for number, xy in zip(order.tolist(), nodes[order].tolist(), strict=True):  # far to near
+        polygon(xy, fill=number)
+    face = np.array(image, dtype=np.int64)
+    depth, weights = np.full((rows, columns), -np.inf), np.zeros((rows, columns, 3))
+    row, column = np.nonzero(face >= 0)
+    shown = face[row, column]
+    shares = np.clip(
+        _weights(corners[shown], area[shown], np.stack([column, row], axis=1)), 0.0, 1.0
+    )  # sides on pixels
+    weights[row, column] = shares / shares.sum(axis=1, keepdims=True)
+    depth[row, column] = (weights[row, column] * corners[shown, :, 2]).sum(axis=1)
+    face[row, column] = drawn[shown]
+    return Raster(face, depth, weights, low, pixel)
 
 
 def _weights(corners: Floats, area: Floats, at: NDArray[Any]) -> Floats:
@@ -140,14 +133,6 @@ def counted_around(mask: Mask, wide: int, tall: int | None = None) -> Ints:
     return total
 
 
-def near_changes(labels: Ints, wide: int) -> Mask:
-    """Mask of the pixels within so many columns and rows of another label."""
-    is_edge = np.zeros(labels.shape, bool)
-    is_edge[:, 1:] |= labels[:, 1:] != labels[:, :-1]
-    is_edge[1:] |= labels[1:] != labels[:-1]
-    return np.asarray(counted_around(is_edge, wide) > 0)
-
-
 def most_around(labels: Ints, wide: int) -> Ints:
     """The label that most pixels around each have, of pixels that have one."""
     best, most = labels, np.zeros(labels.shape, np.int64)
@@ -157,52 +142,35 @@ def most_around(labels: Ints, wide: int) -> Ints:
     return np.where(labels >= 0, best, labels)
 
 
-def spread(depth: Floats, wide: int, block: int = 1) -> Floats:
-    """Depths, carried to so many pixels around that have none (-inf): of the greatest around, in blocks of pixels."""
-    shape = -(-np.array(depth.shape) // block)
-    padded = np.pad(depth, [(0, block * n - size) for n, size in zip(shape, depth.shape, strict=True)], "edge")
-    coarse = padded.reshape(shape[0], block, shape[1], block).max(axis=(1, 3))
-    for _ in range(-(-wide // block)):
-        around = np.pad(coarse, 1, constant_values=-np.inf)
-        nearest = np.max([around[1:-1, 2:], around[1:-1, :-2], around[2:, 1:-1], around[:-2, 1:-1]], axis=0)
-        coarse = np.where(np.isfinite(coarse), coarse, nearest)
-    fine = np.repeat(np.repeat(coarse, block, axis=0), block, axis=1)[: depth.shape[0], : depth.shape[1]]
-    return np.where(np.isfinite(depth), depth, fine)
-
-
-def greatest_around(depth: Floats, wide: int) -> Floats:
-    """The greatest depth within so many columns and rows of each pixel."""
-    for axis in (0, 1):
-        n, reach, size = depth.shape[axis], 1, 2 * wide + 1
-        padding = [(wide, wide) if k == axis else (0, 0) for k in (0, 1)]
-        windows = np.moveaxis(np.pad(depth, padding, constant_values=-np.inf), axis, 0)
-        while 2 * reach <= size:
-            windows = np.maximum(windows[:-reach], windows[reach:])
-            reach *= 2
-        depth = np.moveaxis(np.maximum(windows[:n], windows[size - reach : size - reach + n]), 0, axis)
-    return depth
-
-
-def lines_between(labels: Ints, raster: Raster, jump: float, depth: Floats | None = None) -> list[Floats]:
+def lines_between(
+    labels: Ints, raster: Raster, jump: float, cell: float = 0.0, parted: Ints | None = None
+) -> list[Floats]:
     """Smooth lines (n, 2) where labels differ, and where one part hides another that is farther away.
 
     Parameters
     ----------
     labels : (rows, columns); -1 where there is nothing.
     jump : least difference of depths where one part hides another.
-    depth : default: that of the raster.
+    cell : size of the faces of the mesh, whose steps are smoothed away.
+    parted : other labels (rows, columns), between which no part hides another: their line is among those of the labels.
     """
-    far = np.where(labels >= 0, raster.depth if depth is None else depth, 0.0)
-    upright = (labels[:, 1:] != labels[:, :-1]) | _is_jump(far, jump)
-    level = (labels[1:] != labels[:-1]) | _is_jump(far.T, jump).T
+    far = np.where(labels >= 0, raster.depth, 0.0)
+    one = labels if parted is None else parted
+    upright = (labels[:, 1:] != labels[:, :-1]) | (_is_jump(far, jump) & (one[:, 1:] == one[:, :-1]))
+    level = (labels[1:] != labels[:-1]) | (_is_jump(far.T, jump).T & (one[1:] == one[:-1]))
     around: dict[Node, list[Node]] = {}
     for sides, down, right in ((upright, 1, 0), (level, 0, 1)):
         for row, column in (np.argwhere(sides) + [right, down]).tolist():
             first, second = (row, column), (row + down, column + right)
             around.setdefault(first, []).append(second)
             around.setdefault(second, []).append(first)
-    lines = [_smoothed(chain, len(around[chain[0]]) == 2) for chain in _chains(around)]
-    return [raster.low + raster.pixel * (line[:, ::-1] - 0.5) for line in lines if len(line)]
+    rounds = max(SMOOTHINGS, int((SMOOTH * cell / raster.pixel) ** 2))
+    lines = []
+    for chain in _chains(around):
+        is_closed, ends = chain[0] == chain[-1], [len(around[chain[place]]) for place in (0, -1)]
+        if len(chain) >= SPECK or not (is_closed or 1 in ends):
+            lines.append(_smoothed(chain, rounds, is_loop=is_closed and ends[0] == 2))
+    return [raster.low + raster.pixel * (line[:, ::-1] - 0.5) for line in lines]
 
 
 def _is_jump(depth: Floats, jump: float) -> Mask:
@@ -229,12 +197,10 @@ def _chains(around: dict[Node, list[Node]]) -> Iterator[list[Node]]:
             yield chain
 
 
-def _smoothed(chain: list[Node], is_loop: bool) -> Floats:
-    """The corners (n, 2) of a line with each moved towards its neighbours; its ends stay. A speck has none."""
+def _smoothed(chain: list[Node], rounds: int, *, is_loop: bool) -> Floats:
+    """The corners (n, 2) of a line with each moved towards its neighbours, so often; its ends stay."""
     line = np.array(chain, float)
-    if chain[0] == chain[-1] and len(chain) < SPECK:
-        return np.zeros((0, 2))
-    for _ in range(SMOOTHINGS):
+    for _ in range(rounds):
         if is_loop:
             line[:-1] = 0.25 * np.roll(line[:-1], 1, axis=0) + 0.5 * line[:-1] + 0.25 * np.roll(line[:-1], -1, axis=0)
             line[-1] = line[0]

@@ -10,16 +10,7 @@ import numpy as np
 from ..capabilities.workspace.surface import face_normals
 from ..common.arrays import Floats, Ints, Mask
 from .eye import USUAL, Eye, best_of
-from .raster import (
-    Raster,
-    counted_around,
-    greatest_around,
-    lines_between,
-    most_around,
-    near_changes,
-    rasterised,
-    spread,
-)
+from .raster import Raster, counted_around, lines_between, most_around, rasterised
 
 if TYPE_CHECKING:
     from ..capabilities.workspace.region import Region
@@ -37,31 +28,14 @@ JUDGED, CELLS = 6000, 40
 SPAN = 100.0
 """Size of the box of a workspace whose coordinates have different units: then each has this span."""
 
-NEAR = 1.5
-"""Distance from a line within which pixels ask for their limit: marching cubes cuts edges by up to a cell [cells]."""
+AROUND, ROUGH, VOTES, ROUNDS = 1.0, 1.0, 3, 8
+"""Cells around each pixel that its limit is the most frequent of. Without margins, where the mesh is rough: how many
+cells, how often, and how often normals are averaged."""
 
-REACH, POINTS, HALVINGS = 1.6, 7, 4
-"""Of the ray of a pixel: how far before and behind the mesh points are asked [cells], how many, and how often the step
-that the border is in is halved."""
+TOOTH = 0.5
+"""Cells around a pixel most of which are covered, or it is none of the solid's: marching cubes leave teeth on edges."""
 
-GRAZES, GOLDEN = 4, 0.618
-"""How often a ray that meets nothing is asked in between, where the margin is greatest: it may graze an edge; and where
-in the stretch that is left, as a share of it."""
-
-SLOPE = 0.1
-"""Step in which slopes are measured [cells]."""
-
-STRIDES = 2
-"""Pixels that are asked first, to the width in which any are: those between four of one limit are filled."""
-
-FEW, VOTES, ROUNDS = 2, 3, 8
-"""Without margins: pixels around each, at least, that its limit is the most frequent of; how often, and how often
-normals are averaged, for the mesh is rough there."""
-
-STEEPEST = 4.0
-"""Slope towards the eye beyond which a pixel is behind those around it."""
-
-JUMP, JUMP_PIXELS = 3.0, 8.0
+JUMP, JUMP_PIXELS = 3.0, 24.0
 """Least difference in depth of a line where a solid hides itself [cells, pixels]."""
 
 LIGHT = (-0.42, 0.50, 0.80)
@@ -93,8 +67,11 @@ class SeenSolid:
     @property
     def lines(self) -> list[Floats]:
         """Lines between limits, and around what hides what is behind it, (n, 2) each."""
-        labels = self.limit if is_told_apart(self.region) else np.minimum(self.limit, 0)
-        return lines_between(labels, self.raster, max(JUMP * self.step, JUMP_PIXELS * self.raster.pixel), self.depth)
+        labels, parted = self.limit, self.region.face_limit[self.raster.face]
+        if not is_told_apart(self.region):
+            labels, parted = np.minimum(labels, 0), np.minimum(parted, 0)
+        jump = max(JUMP * self.step, JUMP_PIXELS * self.raster.pixel)
+        return lines_between(labels, self.raster, jump, self.step, parted)
 
     def hides(self, points: Floats) -> Mask:
         """Mask (n,) of points in space (n, 3) that are within the solid, or behind it."""
@@ -123,23 +100,18 @@ def seen_solid(region: Region, eye: Eye, across: int) -> SeenSolid:
     """
     scale = scale_of(region)
     points, step = region.vertices * scale, float((region.resolution * scale).max())
-    seen = eye.seen(points)
-    span = float(np.ptp(seen[:, 0]))
-    margin = int(np.ceil(NEAR * step / max(span, step) * across)) + 3
-    raster = rasterised(seen, region.faces, across + 2 * margin, margin)
+    raster = rasterised(eye.seen(points), region.faces, across)
     limit = np.where(raster.face >= 0, region.face_limit[raster.face], -1)
     if region._question.has_margins:
-        normals = corner_normals(points, region.faces, region.face_limit)
+        normals, votes = corner_normals(points, region.faces, region.face_limit), [AROUND]
     else:
-        normals = corner_normals(points, region.faces, rounds=ROUNDS)
+        normals, votes = corner_normals(points, region.faces, rounds=ROUNDS), [ROUGH] * VOTES
     normal = (raster.weights[..., None] * normals[raster.face]).sum(axis=2)
-    solid = SeenSolid(region, eye, raster, scale, step, limit, raster.depth.copy(), _units(normal))
-    if region._question.has_margins:
-        _sharpen(solid)
-    else:
-        for _ in range(VOTES):
-            limit[:] = most_around(limit, max(FEW, int(step / raster.pixel)))
-    return solid
+    wide = int(TOOTH * step / raster.pixel)
+    limit[2 * counted_around(limit >= 0, wide) < (2 * wide + 1) ** 2] = -1
+    for cells in votes:
+        limit = most_around(limit, max(1, int(cells * step / raster.pixel)))
+    return SeenSolid(region, eye, raster, scale, step, limit, raster.depth, _units(normal))
 
 
 def _units(vectors: Floats) -> Floats:
@@ -156,127 +128,6 @@ def corner_normals(points: Floats, faces: Ints, labels: Ints | None = None, roun
         normals = _units(np.stack(sums, axis=1))
         flat = np.asarray(normals[place].mean(axis=1))
     return np.asarray(normals[place])
-
-
-def _sharpen(solid: SeenSolid) -> None:
-    """Ask the pixels near lines where their rays meet the border: first a few, then those between that differ."""
-    limit, wide = solid.limit, int(np.ceil(NEAR * solid.step / solid.raster.pixel)) + 1
-    stride = 1 << int(np.log2(max(wide // STRIDES, 1)))
-    guess = spread(solid.raster.depth, wide + stride, stride)
-    is_far = greatest_around(guess, wide) > guess + STEEPEST * wide * solid.raster.pixel
-    nearest = spread(np.where(is_far, -np.inf, guess), wide, stride)
-    is_open, is_asked = near_changes(limit, wide) & np.isfinite(guess), np.zeros(limit.shape, bool)
-    while is_open.any():
-        nodes = np.zeros(limit.shape, bool)
-        nodes[::stride, ::stride] = True
-        nodes &= (counted_around(is_open, stride) > 0) & np.isfinite(guess) & ~is_asked
-        _ask(solid, np.flatnonzero(nodes), guess, nearest)
-        is_asked |= nodes
-        is_open &= ~is_asked
-        if stride > 1:
-            is_open &= ~_fill_between(solid, is_open, stride)
-        stride //= 2
-
-
-def _fill_between(solid: SeenSolid, asked: Mask, stride: int) -> Mask:
-    """Fill pixels between four nodes, so many pixels apart, of one limit; the mask of the pixels that were."""
-    rows, columns = np.nonzero(asked)
-    (row, down), (column, right) = np.divmod(rows, stride), np.divmod(columns, stride)
-    n_rows, n_columns = solid.limit[::stride, ::stride].shape
-    inner = (row + 1 < n_rows) & (column + 1 < n_columns)
-    rows, columns, row, column, down, right = (each[inner] for each in (rows, columns, row, column, down, right))
-    nodes = [(row + a, column + b) for a in (0, 1) for b in (0, 1)]
-    labels, depths, normals = (
-        np.stack([image[::stride, ::stride][node] for node in nodes])
-        for image in (solid.limit, solid.depth, solid.normal)
-    )
-    alike = (labels == labels[0]).all(axis=0)
-    filled = np.zeros(asked.shape, bool)
-    beside = alike & (labels[0] < 0) & (solid.limit[rows, columns] < 0)  # nothing is there
-    filled[rows[beside], columns[beside]] = True
-    alike &= labels[0] >= 0
-    alike &= np.ptp(np.where(alike, depths, 0.0), axis=0) < max(JUMP * solid.step, JUMP_PIXELS * solid.raster.pixel)
-    down, right = down[alike] / stride, right[alike] / stride
-    shares = np.stack([(1 - down) * (1 - right), (1 - down) * right, down * (1 - right), down * right])
-    at = rows[alike], columns[alike]
-    solid.limit[at] = labels[0, alike]
-    solid.depth[at] = (shares * depths[:, alike]).sum(axis=0)
-    solid.normal[at] = _units((shares[..., None] * normals[:, alike]).sum(axis=0))
-    filled[at] = True
-    return filled
-
-
-def _ask(solid: SeenSolid, pixels: Ints, guess: Floats, nearest: Floats) -> None:
-    """Ask the rays of pixels, (n,), where the nearest part around them is; where they meet nothing there, behind it."""
-    covered = pixels[(nearest > guess).reshape(-1)[pixels]]
-    rest = np.ones(solid.limit.size, bool)
-    rest[_find(solid, covered, nearest)] = False
-    _find(solid, pixels[rest[pixels]], guess)
-
-
-def _find(solid: SeenSolid, pixels: Ints, guess: Floats) -> Ints:
-    """Find where rays enter the border near a guess of the depth, and what limit is outside; the pixels where it is."""
-    axes, reach = solid.eye.axes, REACH * solid.step
-    base = solid.raster.centres(pixels) @ axes[:2] + guess.reshape(-1, 1)[pixels] * axes[2]
-    shares = np.linspace(reach, -reach, POINTS)
-    margins, bindings = _measured(solid, base[:, None] + shares[:, None] * axes[2])
-    inside = margins >= 0.0
-    first = inside.argmax(axis=1)
-    low, high = shares[first], shares[np.maximum(first - 1, 0)]
-    limit = bindings[np.arange(len(first)), np.maximum(first - 1, 0)]
-    is_hit = inside.any(axis=1) & ~inside[:, 0]
-    missed = np.flatnonzero(~inside.any(axis=1))
-    low[missed], high[missed], limit[missed], is_hit[missed] = _grazed(solid, base[missed], margins[missed], shares)
-    hit = np.flatnonzero(is_hit)
-    low, high, limit, base = low[hit], high[hit], limit[hit], base[hit]
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        margin, binding = _measured(solid, base + middle[:, None] * axes[2])
-        is_within = margin >= 0.0
-        limit = np.where(is_within, limit, binding)
-        low, high = np.where(is_within, middle, low), np.where(is_within, high, middle)
-    at = base + low[:, None] * axes[2]
-    beside = at[:, None] + SLOPE * solid.step * np.concatenate([np.zeros((1, 3)), np.eye(3)])
-    margins, _ = _measured(solid, beside)
-    with np.errstate(invalid="ignore"):  # infinite where a leg does not reach
-        slope = margins[:, :1] - margins[:, 1:]
-    is_named, is_steep = limit >= 0, np.isfinite(slope).all(axis=1) & (slope != 0.0).any(axis=1)
-    solid.limit.reshape(-1)[pixels[hit[is_named]]] = limit[is_named]
-    solid.depth.reshape(-1)[pixels[hit]] = guess.reshape(-1)[pixels[hit]] + low
-    solid.normal.reshape(-1, 3)[pixels[hit[is_steep]]] = _units(slope[is_steep])
-    return pixels[hit]
-
-
-def _grazed(solid: SeenSolid, base: Floats, margins: Floats, shares: Floats) -> tuple[Floats, Floats, Ints, Mask]:
-    """Look on rays without a point within for one between the points: inside, before it, the limit there, the mask."""
-    best = margins.argmax(axis=1)
-    rows = np.flatnonzero((best > 0) & (best < POINTS - 1))  # else the ray is still on its way
-    best = np.clip(best, 1, POINTS - 2)
-    near, far = shares[best - 1], shares[best + 1]
-    before, limit = near.copy(), np.full(len(base), -1)
-    inside, is_hit = np.full(len(base), np.nan), np.zeros(len(base), bool)
-    for _ in range(GRAZES):
-        if not len(rows):
-            break
-        tried = near[rows, None] + np.array([1.0 - GOLDEN, GOLDEN]) * (far - near)[rows, None]
-        margin, binding = _measured(solid, base[rows, None] + tried[..., None] * solid.eye.axes[2])
-        is_within = margin >= 0.0
-        hit, first = is_within.any(axis=1), is_within.argmax(axis=1)
-        at = np.flatnonzero(hit)
-        inside[rows[at]], is_hit[rows[at]] = tried[at, first[at]], True
-        before[rows[at]] = np.where(first[at] == 1, tried[at, 0], near[rows[at]])
-        is_nearer = margin[:, 0] >= margin[:, 1]
-        far[rows] = np.where(is_nearer, tried[:, 1], far[rows])
-        near[rows] = np.where(is_nearer, near[rows], tried[:, 0])
-        limit[rows] = binding[:, 0]
-        rows = rows[~hit]
-    return inside, before, limit, is_hit
-
-
-def _measured(solid: SeenSolid, points: Floats) -> tuple[Floats, Ints]:
-    """Margins and limits (...) of points of space (..., 3)."""
-    margins, bindings = solid.region._question.measure(points.reshape(-1, 3) / solid.scale)
-    return margins.reshape(points.shape[:-1]), bindings.reshape(points.shape[:-1])
 
 
 def in_the_light(normal: Floats, eye: Eye, colours: Floats) -> Floats:
