@@ -20,9 +20,9 @@ FLAT = 1e-12
 STEEPER = 4.0
 """Factor by which a jump in depth exceeds the steps beside it, at least: else it is a slope."""
 
-SMOOTH, SMOOTHINGS, SPECK = 2.0, 30, 7
-"""How far a line is smoothed along it [cells], by so many moves of its corners towards their neighbours at least; sides
-below which a line is a speck, where it is a loop or ends in nothing."""
+SMOOTHINGS, SPECK = 30, 7
+"""Times at least that corners of a line are moved towards their neighbours. Sides below which a line is a speck, if it
+is a loop or ends in nothing."""
 
 Node: TypeAlias = tuple[int, int]
 
@@ -143,7 +143,7 @@ def most_around(labels: Ints, wide: int) -> Ints:
 
 
 def lines_between(
-    labels: Ints, raster: Raster, jump: float, cell: float = 0.0, parted: Ints | None = None
+    labels: Ints, raster: Raster, jump: float, smooth: float = 0.0, parted: Ints | None = None
 ) -> list[Floats]:
     """Smooth lines (n, 2) where labels differ, and where one part hides another that is farther away.
 
@@ -151,7 +151,7 @@ def lines_between(
     ----------
     labels : (rows, columns); -1 where there is nothing.
     jump : least difference of depths where one part hides another.
-    cell : size of the faces of the mesh, whose steps are smoothed away.
+    smooth : how far along lines they are smoothed [pixels].
     parted : other labels (rows, columns), between which no part hides another: their line is among those of the labels.
     """
     far = np.where(labels >= 0, raster.depth, 0.0)
@@ -164,7 +164,7 @@ def lines_between(
             first, second = (row, column), (row + down, column + right)
             around.setdefault(first, []).append(second)
             around.setdefault(second, []).append(first)
-    rounds = max(SMOOTHINGS, int((SMOOTH * cell / raster.pixel) ** 2))
+    rounds = max(SMOOTHINGS, int(smooth**2))
     lines = []
     for chain in _chains(around):
         is_closed, ends = chain[0] == chain[-1], [len(around[chain[place]]) for place in (0, -1)]

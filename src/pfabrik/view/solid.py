@@ -28,12 +28,16 @@ JUDGED, CELLS = 6000, 40
 SPAN = 100.0
 """Size of the box of a workspace whose coordinates have different units: then each has this span."""
 
-AROUND, ROUGH, VOTES, ROUNDS = 1.0, 1.0, 3, 8
-"""Cells around each pixel that its limit is the most frequent of. Without margins, where the mesh is rough: how many
-cells, how often, and how often normals are averaged."""
+VOTES, ROUNDS = 3, 8
+"""Without margins, where the mesh is rough: how often each pixel takes the limit that is the most frequent of a cell
+around it, and how often normals are averaged. With margins once does."""
 
-TOOTH = 0.5
-"""Cells around a pixel most of which are covered, or it is none of the solid's: marching cubes leave teeth on edges."""
+TOOTH, SMOOTH = 0.5, 2.0
+"""Cells around a pixel most of which are covered, or it is none of the solid's: marching cubes leave teeth on edges.
+Cells that lines are smoothed along."""
+
+COARSE = 10.0
+"""Size of a cell from which on its edges are seen as they are [pixels]."""
 
 JUMP, JUMP_PIXELS = 3.0, 24.0
 """Least difference in depth of a line where a solid hides itself [cells, pixels]."""
@@ -71,7 +75,12 @@ class SeenSolid:
         if not is_told_apart(self.region):
             labels, parted = np.minimum(labels, 0), np.minimum(parted, 0)
         jump = max(JUMP * self.step, JUMP_PIXELS * self.raster.pixel)
-        return lines_between(labels, self.raster, jump, self.step, parted)
+        return lines_between(labels, self.raster, jump, SMOOTH * self.cell, parted)
+
+    @property
+    def cell(self) -> float:
+        """Size of a cell as far as it is smoothed away [pixels]."""
+        return min(self.step / self.raster.pixel, COARSE)
 
     def hides(self, points: Floats) -> Mask:
         """Mask (n,) of points in space (n, 3) that are within the solid, or behind it."""
@@ -102,16 +111,16 @@ def seen_solid(region: Region, eye: Eye, across: int) -> SeenSolid:
     points, step = region.vertices * scale, float((region.resolution * scale).max())
     raster = rasterised(eye.seen(points), region.faces, across)
     limit = np.where(raster.face >= 0, region.face_limit[raster.face], -1)
-    if region._question.has_margins:
-        normals, votes = corner_normals(points, region.faces, region.face_limit), [AROUND]
-    else:
-        normals, votes = corner_normals(points, region.faces, rounds=ROUNDS), [ROUGH] * VOTES
-    normal = (raster.weights[..., None] * normals[raster.face]).sum(axis=2)
-    wide = int(TOOTH * step / raster.pixel)
+    has_margins = region._question.has_margins
+    labels, rounds, votes = (region.face_limit, 1, 1) if has_margins else (None, ROUNDS, VOTES)
+    normals = corner_normals(points, region.faces, labels, rounds)
+    normal = _units((raster.weights[..., None] * normals[raster.face]).sum(axis=2))
+    solid = SeenSolid(region, eye, raster, scale, step, limit, raster.depth, normal)
+    wide = int(TOOTH * solid.cell)
     limit[2 * counted_around(limit >= 0, wide) < (2 * wide + 1) ** 2] = -1
-    for cells in votes:
-        limit = most_around(limit, max(1, int(cells * step / raster.pixel)))
-    return SeenSolid(region, eye, raster, scale, step, limit, raster.depth, _units(normal))
+    for _ in range(votes):
+        limit[:] = most_around(limit, max(1, int(solid.cell)))
+    return solid
 
 
 def _units(vectors: Floats) -> Floats:
