@@ -2,35 +2,23 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import shlex
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from command import in_process, pfabrik, write_files
-from pfabrik.cli.group import exit_code
-from pfabrik.cli.outputs import new_folder
-from pfabrik.cli.stops import AGAIN
 
 
 def interruptible() -> None:
     """A shell starts what runs in its background with interrupts ignored."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
-@pytest.fixture
-def _interruptible() -> Iterator[None]:
-    """Interrupts are raised in this process, too, where it was started in a background."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
 
 
 def stopped(line: str, number: int, when: Callable[[], object]) -> tuple[int, str]:
@@ -130,59 +118,6 @@ def test_an_interruption_while_the_command_is_loaded_is_told_as_one() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "pfabrik: interrupted\n")
-
-
-def test_an_interruption_while_a_folder_is_removed_is_told_as_one(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    close = os.close
-
-    def interrupted(descriptor: int) -> None:  # Python's `rmtree` then closes it once more, which fails
-        monkeypatch.setattr(os, "close", close)
-        close(descriptor)
-        raise KeyboardInterrupt
-
-    def work() -> None:
-        with new_folder(folder / "out"):
-            monkeypatch.setattr(os, "close", interrupted)
-
-    assert exit_code(work) == 130
-    assert capsys.readouterr().err == "pfabrik: interrupted\n"
-    assert os.listdir(folder) == []
-
-
-@pytest.mark.usefixtures("_interruptible")
-def test_an_interruption_that_is_swallowed_comes_again(capsys: pytest.CaptureFixture[str]) -> None:
-    def work() -> None:
-        with contextlib.suppress(KeyboardInterrupt):
-            os.kill(os.getpid(), signal.SIGINT)
-            time.sleep(5)
-        for _ in range(50):  # no sleep ends by the second one, which is no signal
-            time.sleep(0.1)
-        pytest.fail("nobody was interrupted")
-
-    assert exit_code(work) == 130
-    assert capsys.readouterr().err == "pfabrik: interrupted\n"
-
-
-@pytest.mark.usefixtures("_interruptible")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_what_cleans_up_is_not_disturbed_by_further_signals(number: int) -> None:
-    cleaned = []
-
-    def work() -> None:
-        try:
-            os.kill(os.getpid(), number)
-            time.sleep(5)
-        finally:
-            os.kill(os.getpid(), number)
-            time.sleep(3 * AGAIN)
-            cleaned.append(True)
-
-    before = signal.getsignal(number)
-    assert exit_code(work) == 128 + number
-    assert cleaned
-    assert signal.getsignal(number) == before
 
 
 @pytest.mark.usefixtures("folder")

@@ -15,8 +15,6 @@ import pytest
 
 import pfabrik as pf
 from command import in_process, listed, pfabrik, rows_of, told, write_files
-from pfabrik.cli import outputs
-from pfabrik.cli.outputs import ignores_case
 from pfabrik.machine.catalog import template
 from written import check_written
 
@@ -210,17 +208,6 @@ def test_two_outputs_to_one_place_are_refused(folder: Path, line: str) -> None:
     assert "found one place for two outputs" in result.stderr
     assert listed() == before
     assert Path("there.png").read_text() == "precious"
-
-
-def test_names_that_differ_by_case_are_one_place_where_the_file_system_says_so(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    Path("a.png").write_text("")
-    assert ignores_case(folder) == Path("A.Png").exists()
-    for answer in (False, True):
-        monkeypatch.setattr(outputs, "ignores_case", lambda _, answer=answer: answer)
-        assert outputs.is_one_place(Path("out.csv"), Path("OUT.csv")) == answer
-        assert not outputs.is_one_place(Path("out.csv"), Path("other.csv"))
 
 
 def test_a_file_that_exists_is_kept_unless_forced() -> None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import importlib
 import keyword
 import os
+import signal
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
+from types import FrameType
 from typing import Any, NoReturn
 
 import click
@@ -19,10 +22,12 @@ from ..errors import InvalidArgument, PfabrikError, near_miss
 from ..kernels import NoKernels
 from .examples import EXAMPLES
 from .printing import complain
-from .stops import Stops
 
 WRONG_INPUT = 2
 PIPE_CLOSED = 141
+
+ENDS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+"""Signals to end a command, beside the one of Ctrl-C."""
 
 
 class CommandGroup(click.Group):
@@ -116,23 +121,8 @@ def take_closed_places() -> None:
 
 def exit_code(run: Callable[[], Any]) -> int:
     """Run a command: the integer it returns, or the code of its failure, which is reported on stderr."""
-    with Stops() as stops:
-        try:
-            code = code_of(run, stops)
-            stops.end()
-        except KeyboardInterrupt:  # raised again just as the command ended
-            stops.end()
-            code = stops.code
-        if stops.number is not None:  # also where whoever was interrupted made nothing of it
-            complain(stops.word)
-            return stops.code
-        return code
-
-
-def code_of(run: Callable[[], Any], stops: Stops) -> int:
-    """Run a command, and report a failure on stderr, except a signal that ended it."""
     try:
-        with plain_warnings(), interruptions_first(stops):
+        with plain_warnings(), signals_interrupt():
             result = run()
         return result if isinstance(result, int) else 0
     except click.UsageError as error:
@@ -146,10 +136,10 @@ def code_of(run: Callable[[], Any], stops: Stops) -> int:
         complain(str(error))
     except SystemExit:  # click leaves this way when the reader of a pipe has gone
         return PIPE_CLOSED
-    except KeyboardInterrupt:
-        if stops.number is None:
-            complain(stops.word)
-        return stops.code
+    except (KeyboardInterrupt, click.Abort) as error:
+        number = next((each for each in (error.__cause__ or error).args if each in ENDS), signal.SIGINT)
+        complain("interrupted" if number == signal.SIGINT else "terminated")
+        return 128 + int(number)
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         complain(f"{where}{error.strerror or error}")
@@ -169,19 +159,22 @@ def plain_warnings() -> Iterator[None]:
 
 
 @contextmanager
-def interruptions_first(stops: Stops) -> Iterator[None]:
-    """Report an interruption, not a failure that it causes: a clean-up that it meets may close a file twice."""
+def signals_interrupt() -> Iterator[None]:
+    """Let other signals to end interrupt as Ctrl-C does: what is half written is removed. Ignored ones stay ignored."""
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt(number)
+
+    is_main = threading.current_thread() is threading.main_thread()  # others can have no handlers
+    before = {number: signal.getsignal(number) for number in ENDS if is_main}
+    heard = [number for number, handler in before.items() if handler != signal.SIG_IGN]
     try:
+        for number in heard:
+            signal.signal(number, interrupt)
         yield
-    except Exception as error:
-        if stops.number is not None:
-            raise KeyboardInterrupt from error
-        cause: BaseException | None = error
-        while cause is not None and not isinstance(cause, KeyboardInterrupt):
-            cause = cause.__context__
-        if cause is not None:
-            raise KeyboardInterrupt from error
-        raise
+    finally:
+        for number in heard:
+            signal.signal(number, before[number])
 
 
 def leave(code: int) -> NoReturn:

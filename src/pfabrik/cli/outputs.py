@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
 import sys
-import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
@@ -119,29 +118,12 @@ def is_one_place(path: Path, other: Path) -> bool:
     if STANDARD in (path, other):
         path, other = (other, path) if path == STANDARD else (path, other)
         return path == STANDARD or is_same_file(path, other, sys.stdout)
-    if real(path) == real(other) or is_same_file(path, other, sys.stdout):
-        return True
-    folder, name = real(path).parent, _folded(path)
-    return folder == real(other).parent and name == _folded(other) and ignores_case(folder)
+    return real(path) == real(other) or is_same_file(path, other, sys.stdout)
 
 
 def real(path: Path) -> Path:
     """A path without links, but for those that lead round in circles."""
     return Path(os.path.realpath(path))
-
-
-def _folded(path: Path) -> str:
-    """A name as file systems compare it that ignore case."""
-    return unicodedata.normalize("NFC", real(path).name).casefold()
-
-
-def ignores_case(folder: Path) -> bool:
-    """True if a folder takes names that differ by case alone for one, as far as names of it and its parents show."""
-    for parent in (folder, *folder.parents):
-        swapped = parent.with_name(parent.name.swapcase()) if parent.name else parent
-        if swapped != parent:
-            return swapped.exists() and swapped.samefile(parent)
-    return False
 
 
 @contextmanager
@@ -166,15 +148,15 @@ def whole_file(path: Path) -> Iterator[TextIO]:
 @contextmanager
 def new_folder(path: Path) -> Iterator[Path]:
     """An empty folder beside `path` that goes when the block ends; a failure speaks of `path`, which the user knows."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    with ExitStack() as removals:
-        for _ in range(2):  # an interruption may come while it is removed
-            removals.callback(shutil.rmtree, part, ignore_errors=True)
-        try:
-            part.mkdir(parents=True)
-        except OSError as error:
-            raise OSError(error.errno, error.strerror, str(path)) from error
-        yield part
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        folder = TemporaryDirectory(
+            prefix=f".{path.name}.", suffix=".part", dir=path.parent, ignore_cleanup_errors=True
+        )
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+    with folder as part:
+        yield Path(part)
 
 
 @contextmanager
