@@ -30,8 +30,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
+from pfabrik.common.drawing import round_length
 from pfabrik.machine.description.plane import plane_of
-from pfabrik.view.canvas import round_length
 from pfabrik.view.crossings import far_to_near
 from pfabrik.view.eye import Eye, eye_for, eye_of, eye_on
 from pfabrik.view.looks import HELD, LOOKS
@@ -531,6 +531,24 @@ def test_a_scale_is_the_largest_round_length_up_to_any_number() -> None:
     for number in (*np.random.default_rng(0).uniform(1e-9, 1e9, 200), np.nextafter(1000.0, 0.0), 1e23, 0.2, 5.0):
         length = round_length(float(number))
         assert length <= number < 2.6 * length
+
+
+def test_machines_drawn_like_each_other_are_at_one_scale() -> None:
+    machines = pf.load("stewart"), pf.load("linear_delta")
+    figure = Figure(figsize=(8.0, 4.0))
+    axes = [figure.add_axes((0.5 * k, 0.0, 0.5, 1.0)) for k in (0, 1)]
+    for ax, shown, other in zip(axes, machines, reversed(machines), strict=True):
+        pf.plot(shown, ax=ax, view="front", like=other)
+    assert np.ptp(axes[0].get_xlim()) == pytest.approx(np.ptp(axes[1].get_xlim()))
+
+
+def test_the_key_names_the_links_that_are_nearest() -> None:
+    machine = pf.load("reachy_mini").with_clearance(0.005)
+    for depth, said in ((0.0, "nearest"), (0.03, "too near")):
+        target = machine.home_pose - depth * np.eye(4)[2][:, None] * np.eye(4)[3]
+        key = pf.plot(pf.solve_ik(machine, target @ pf.pose([0, 0, 0], rpy=[0, 10 * depth, 0]))).get_legend()
+        assert key is not None
+        assert f"{said}: body–head" in [text.get_text() for text in key.get_texts()]
 
 
 def test_an_arm_is_drawn_seen_end_on(tmp_path: Path) -> None:

@@ -52,10 +52,10 @@ print(sorted({each.requirement for each in found.binding if each.share > 0.05}))
 # Distances from singularities have no proof; samples decide, and the result says so.
 print("by samples:", *found.unproved)
 
-# The machine as it came, and as it is now; mind the scale.
-figure, axes = plt.subplots(1, 2, figsize=(8, 4), layout="constrained")
-for ax, machine in zip(axes, (hexapod, found.mechanism), strict=True):
-    pf.plot(machine, ax=ax)
+# The machine as it came, and as it is now, at one scale:
+figure, axes = plt.subplots(1, 2, figsize=(8, 4), gridspec_kw={"left": 0, "right": 1, "bottom": 0, "top": 1})
+pf.plot(hexapod, ax=axes[0], like=found.mechanism)
+pf.plot(found.mechanism, ax=axes[1], like=hexapod)
 figure.savefig("struts.png", dpi=110)
 
 # ## Joints that are not where the drawing says

@@ -5,7 +5,7 @@ what stops it.
 """
 
 # Describe the machine by one pair of legs; it stands for three. `base` and `platform` are the centres of the joints at
-# home, `stroke` is the shortest and the longest strut between them.
+# home, `stroke` is the shortest and the longest strut between them; the joints tilt as far as their data sheet says.
 import numpy as np
 
 import pfabrik as pf
@@ -15,6 +15,8 @@ machine = pf.Mechanism.from_legs(
     base=[[100, 20, 0], [100, -20, 0]],
     platform=[[40, 40, 195], [40, -40, 195]],
     stroke=(155, 280),
+    A={"cone": {"axis": "vertical", "half_angle": np.radians(50)}},
+    C={"cone": {"half_angle": np.radians(45)}},
     copies={"count": 3, "axis": [0, 0, 1]},
     reference_point=[0, 0, 195],
     name="hexapod",

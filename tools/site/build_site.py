@@ -51,7 +51,7 @@ def main() -> None:
 def home(readme: str) -> str:
     """The first screen of the README as the home of the site: its text in one column, its film beside it."""
     screen = readme.partition(HOME_ENDS)[0].replace("](docs/", "](")
-    first, install, lines, wishes = re.split(r"\n## .*\n", screen)
+    first, lines, install, wishes = re.split(r"\n## .*\n", screen)
     title, sentence, film, caption = (part.strip() for part in first.strip().split("\n\n"))
     code, shown = re.findall(r"^```.*?^```$", lines, re.DOTALL | re.MULTILINE)
     after = lines.rpartition("```")[2].strip()
@@ -68,8 +68,6 @@ hide: [navigation, toc]
 
 [Start: five minutes](start.md){{ .md-button .md-button--primary }}
 [Drag a machine](gallery.md){{ .md-button }}
-
-{install.strip()}
 </div>
 <figure markdown>
 {film}
@@ -84,6 +82,10 @@ hide: [navigation, toc]
 {shown}
 
 {after}
+
+## Install
+
+{install.strip()}
 
 ## What do you have?
 

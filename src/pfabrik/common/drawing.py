@@ -74,3 +74,10 @@ def require_flat(ax: Axes) -> None:
     """Refuse three-dimensional axes: what is in space is drawn as an eye sees it."""
     if hasattr(ax, "get_zlim"):
         raise InvalidArgument("ax", "three-dimensional axes", "two-dimensional ones, as of figure.add_subplot()")
+
+
+def round_length(most: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is not above `most`."""
+    power = 10.0 ** np.floor(np.log10(most))
+    steps = np.array([0.5, 1.0, 2.0, 5.0, 10.0]) * power  # the first and the last where the logarithm was rounded
+    return float(steps[steps <= most].max())

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..common.arrays import Floats
 from ..common.checks import require_method, require_positive
-from ..common.drawing import SMALL, Size, new_figure, require_flat
+from ..common.drawing import SMALL, Size, new_figure, require_flat, round_length
 from ..errors import InvalidArgument
 from .eye import Eye
 from .looks import Look, dress
@@ -109,12 +109,15 @@ class Canvas:
         ends = self.axes.transData.transform([(0.0, 0.0), (1.0, 0.0)])
         return float(ends[1, 0] - ends[0, 0]) * 72.0 / float(self.axes.get_figure(root=True).dpi)
 
-    def frame(self, points: Floats, unit: str, key: Sequence[Artist] = (), beside: float = 0.0) -> None:
+    def frame(
+        self, points: Floats, unit: str, key: Sequence[Artist] = (), beside: float = 0.0, spans: Any = 0.0
+    ) -> None:
         """Show all of points (n, 3) at one scale, between a key above and what tells directions and lengths below.
 
         Parameters
         ----------
         beside : room for names on the left and right [points].
+        spans : width and height that have room at least [length], (2,).
         """
         flat = self.seen(points)
         low, high = flat.min(axis=0), flat.max(axis=0)
@@ -125,15 +128,16 @@ class Canvas:
         above = self._draw_key(key, _size(self.axes)[0])
         triad = self._triad_box
         below = 0.0 if self.is_plane else float(max(triad[3] - triad[1], SMALL + 2.0 * BAR_OFF)) + STRIP_FREE
-        seen_on_end = 0.5 * np.maximum(END_ON * (float(np.ptp(points, axis=0).max()) or 1.0) - (high - low), 0.0)
+        least = END_ON * (float(np.ptp(points, axis=0).max()) or 1.0)
+        spare = 0.5 * np.maximum(np.maximum(spans, least) - (high - low), 0.0)
         pads = EDGE_FREE + np.array([beside, beside, below, above])
-        start, end, point = fit(self.axes, low - seen_on_end, high + seen_on_end, pads)
+        start, end, point = fit(self.axes, low - spare, high + spare, pads)
         if self.is_plane:
             number_axes(self.axes)
             return
         draw_triad(self.axes, self.eye, self.look, start + (EDGE_FREE - triad[:2]) * point)
         corner = np.array([end[0] - EDGE_FREE * point, start[1] + (EDGE_FREE + SMALL + BAR_OFF) * point])
-        draw_scale_bar(self.axes, self.look, corner, float((high - low).max()) or 1.0, unit)
+        draw_scale_bar(self.axes, self.look, corner, float((high - low + 2.0 * spare).max()), unit)
 
     def _draw_key(self, key: Sequence[Artist], width: float) -> float:
         """Draw a key in as few rows as fit into a width; its height with what is free below it [points]."""
@@ -327,10 +331,3 @@ def draw_scale_bar(axes: Any, look: Look, at: Floats, span: float, unit: str) ->
     words: dict[str, Any] = {"color": look.ink, "fontsize": SMALL, "ha": "center", "va": "top"}
     below: dict[str, Any] = {"xytext": (0.0, -BAR_OFF), "textcoords": "offset points", "annotation_clip": False}
     axes.annotate(f"{length * many:g} {named}", places.mean(axis=0), **below, **words)
-
-
-def round_length(most: float) -> float:
-    """The largest of 1, 2 and 5 times a power of ten that is not above `most`."""
-    power = 10.0 ** np.floor(np.log10(most))
-    steps = np.array([0.5, 1.0, 2.0, 5.0, 10.0]) * power  # the first and the last where the logarithm was rounded
-    return float(steps[steps <= most].max())

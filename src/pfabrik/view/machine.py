@@ -6,7 +6,10 @@ import inspect
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..answers.solution import Solution
+from ..common.arrays import Floats
 from ..common.checks import require_names
 from ..common.drawing import SMALL, Plotted, Theme, View
 from ..kinematics import plane_of
@@ -31,6 +34,7 @@ def plot(
     view: View | None = None,
     size: tuple[float, float] | None = None,
     theme: Theme = "light",
+    like: Mechanism | Solution | None = None,
 ) -> Axes:
     """Draw a machine at home, or one answer: in space, or a planar machine in its plane.
 
@@ -38,7 +42,7 @@ def plot(
     more joints are plates. The base is the pale ground, the end effector blue, pale rails are those of slides, and a
     cross marks the reference point. What holds an answer back, or what it exceeds, is orange, and named: "B3 max".
     Links with a thickness are drawn as they are, of an answer the two that are nearest to each other darker, and orange
-    where they stop it, or overlap.
+    where they stop it, or overlap; the key names them.
 
     Parameters
     ----------
@@ -56,6 +60,8 @@ def plot(
         Width and height of a new figure [inches]. Default: the machine's shape.
     theme : {"light", "dark"}, optional
         Colours for a light or a dark ground.
+    like : Mechanism or Solution, optional
+        What is drawn beside it on axes of the same size: both are at one scale if each is drawn like the other.
 
     Returns
     -------
@@ -72,7 +78,7 @@ def plot(
         Matplotlib is not installed.
     """
     if isinstance(shown, Plotted):
-        return plot_result(shown, ax=ax, names=names, view=view, size=size, theme=theme)
+        return plot_result(shown, ax=ax, names=names, view=view, size=size, theme=theme, like=like)
     mechanism, _ = checked_shown(shown)
     if isinstance(names, bool):
         names = [joint.name for joint in mechanism.joints] if names else ()
@@ -87,7 +93,8 @@ def plot(
         )
     else:
         canvas = canvas_on(ax, eye, look, is_plane=is_plane)
-    canvas.frame(skeleton.points, mechanism.length_unit, key_of(skeleton, look), beside)
+    spans = 0.0 if like is None else np.ptp(_seen(like, view), axis=0)
+    canvas.frame(skeleton.points, mechanism.length_unit, key_of(skeleton, look), beside, spans)
     draw_machine(canvas, skeleton)
     write_names(canvas, skeleton, named)
     axes: Axes = canvas.axes
@@ -112,6 +119,12 @@ def machine_eye(mechanism: Mechanism, view: View | None = None) -> tuple[Eye, bo
     return eye_for(home.joints_and_reference, home.lines), False
 
 
+def _seen(shown: Mechanism | Solution, view: View | None) -> Floats:
+    """What is drawn of a machine or an answer, as its own eye sees it, (n, 2) [length]."""
+    eye, _ = machine_eye(checked_shown(shown)[0], view)
+    return np.asarray(eye.seen(skeleton_of(shown).points)[:, :2])
+
+
 def _beside(skeleton: Skeleton, named: set[str]) -> float:
     """Room for the longest name on both sides [points]."""
     words = [_words(mark) for mark in skeleton.marks if mark.held_by or mark.joint.name in named]
@@ -132,8 +145,11 @@ def key_of(skeleton: Skeleton, look: Look) -> list[Artist]:
     if skeleton.held:
         looks.append(("at a limit", marker_style("revolute", True, True, look)))
     key: list[Artist] = [Line2D([], [], linestyle="", label=label, **style) for label, style in looks]
-    if any(solid.is_stopped for solid in skeleton.solids):
-        key.append(Line2D([], [], color=HELD, linewidth=INK, label="too near"))
+    near = [solid for solid in skeleton.solids if solid.is_nearest]
+    if near:
+        pair, is_stopped = "–".join(dict.fromkeys(solid.body for solid in near)), near[0].is_stopped
+        words = f"{'too near' if is_stopped else 'nearest'}: {pair}"
+        key.append(Line2D([], [], label=words, color=HELD if is_stopped else look.soft, linewidth=INK))
     return key
 
 

@@ -7,14 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..capabilities.clearance.solid_meshes import SolidMesh
+from ..capabilities.workspace.surface import face_normals
 from ..common.arrays import Floats
 from ..machine.description.joints import JointType
 from ..tolerances import TOLERANCES
 from .canvas import Canvas
 from .crossings import cross, far_to_near
+from .drawn_parts import Role, role_of
 from .eye import SAME
 from .looks import HELD, MARKERS, Look
 from .skeleton import Line, Skeleton
+from .solid import in_the_light
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -29,7 +33,7 @@ PLATE_EDGE, GROUND_EDGE = 1.3, 1.0
 FRAME = 0.75
 """Width of the bars of a base, against that of a usual link."""
 
-RAIL, RAIL_FILLING = 5.0, 3.2
+RAIL, RAIL_FILLING = 9.0, 7.4
 """Widths of a rail and of its filling [points]."""
 
 DRIVEN, PASSIVE, SLIDE = 7.4, 5.6, 2.4
@@ -45,8 +49,8 @@ PENS = (0.65, 1.25)
 PLATE = 0.93
 """How opaque plates are."""
 
-SOLID, NEAREST, SOLID_EDGE = 0.12, 0.3, 0.5
-"""How opaque a thick link is, the two that are nearest to each other, and their borders."""
+SOLID, SEAM = 0.6, 0.4
+"""Share of its colour that a thick link has, the rest is paper; width of the lines that close its faces [points]."""
 
 CROSS, CROSS_WIDTH = 9.0, 1.6
 """Size of the cross at the reference point, and width of its lines [points]."""
@@ -100,14 +104,31 @@ def _draw_ground(canvas: Canvas, skeleton: Skeleton, zorder: float, pen: float) 
     for line in base if not plates else ():
         artists += _draw_stroke(canvas, Stroke((line.outline,), (FRAME,), faces, edges), zorder, pen)
     for rail in skeleton.rails:
-        for colour, width in ((edges, RAIL), (look.paper, RAIL_FILLING)):
+        for colour, width in ((edges, RAIL), (faces, RAIL_FILLING)):
             style = {"color": colour, "linewidth": width * pen, "solid_capstyle": "round"}
             artists.append(canvas.line(rail, zorder=zorder + 0.1, **style))
     for solid in sorted(skeleton.solids, key=lambda each: float(canvas.eye.seen(each.vertices)[:, 2].mean())):
-        colour = HELD if solid.is_stopped else look.soft
-        style = {"facecolor": (colour, NEAREST if solid.is_nearest else SOLID), "edgecolor": (colour, SOLID_EDGE)}
-        artists.append(canvas.face(_silhouette(canvas, solid.vertices), zorder=zorder + 0.2, linewidth=0.7, **style))
+        artists += _draw_solid(canvas, solid, role_of(skeleton.mechanism, solid.body), zorder + 0.2)
     return artists
+
+
+def _draw_solid(canvas: Canvas, solid: SolidMesh, role: Role, zorder: float) -> list[Artist]:
+    """A convex solid in the light, pale, in the colour of its body, darker if it is nearest to another, or orange."""
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import to_rgb
+
+    look = canvas.look
+    colour = HELD if solid.is_stopped else look.soft if solid.is_nearest else look.faces[role]
+    corners = solid.vertices[solid.faces]
+    normals = face_normals(corners)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    is_seen = normals @ canvas.eye.axes[2] > 0.0
+    shades = in_the_light(normals[is_seen], canvas.eye, np.array(to_rgb(colour)))
+    pale = SOLID * shades + (1.0 - SOLID) * np.array(to_rgb(look.paper))
+    style: dict[str, Any] = {"facecolors": pale, "edgecolors": pale, "linewidths": SEAM, "zorder": zorder}
+    faces = canvas.axes.add_collection(PolyCollection(list(canvas.seen(corners[is_seen])), **style), autolim=False)
+    edge = {"facecolor": "none", "edgecolor": HELD if solid.is_stopped else look.edges["base"]}
+    return [faces, canvas.face(_silhouette(canvas, solid.vertices), zorder=zorder, linewidth=GROUND_EDGE, **edge)]
 
 
 def _silhouette(canvas: Canvas, vertices: Floats) -> Floats:

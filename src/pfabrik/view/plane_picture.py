@@ -14,7 +14,7 @@ from ..common.arrays import Floats
 from ..common.drawing import SMALL
 from .border_parts import patches_of
 from .canvas import draw_title, number_axes
-from .frame import machine_of, title_of
+from .frame import dense, machine_of, title_of
 from .looks import Look
 from .skeleton import Skeleton
 from .slices import DASHED, area_of, loops_of, outline_of, stretches_of
@@ -41,6 +41,9 @@ they become at most: where that is not enough, the key alone names limits."""
 
 BESIDE = 5.0
 """Width of a figure from which on its key is beside the axes [inches]."""
+
+SHARES = (0.5, 0.3, 0.7, 0.15, 0.85)
+"""Where along its stretch a name may stand, the best first."""
 
 OFF, SIDEWAYS = 5.0, 0.2
 """Distance of a name from the border [points]; component of a direction from which on it stands to that side."""
@@ -103,8 +106,6 @@ def _draw_plane(axes: Any, region: Region, groups: list[Group], look: Look) -> N
     skeleton = machine_of(region)
     if skeleton is not None:
         _draw_machine(axes, skeleton, [POSITIONS.index(name) for name in region.names], look)
-    for loop in loops:
-        _name_stretches(axes, region, places, loop, look)
     area = area_of([places[loop] for loop in loops])
     axes.add_patch(PathPatch(area, facecolor=look.within, edgecolor="none", zorder=0))
     axes.set(**dict(zip(("xlabel", "ylabel"), labels(region), strict=True)))
@@ -117,6 +118,11 @@ def _draw_plane(axes: Any, region: Region, groups: list[Group], look: Look) -> N
         axes.set(**{f"{name}lim": (max(start, low[k] - around[k]), min(end, high[k] + around[k]))})
     if skeleton is not None or len(set(region.units)) == 1:
         axes.set_aspect("equal")
+    axes.get_figure(root=True).draw_without_rendering()  # names are placed on axes that are laid out
+    lines = [(line.get_xydata(), line.get_linestyle() != "None") for line in axes.lines]
+    dots = np.concatenate([dense(each) if is_line and len(each) > 1 else each for each, is_line in lines])
+    for loop in loops:
+        _name_stretches(axes, region, places, loop, look, axes.transData.transform(dots))
 
 
 def _make_room(axes: Any) -> None:
@@ -124,7 +130,8 @@ def _make_room(axes: Any) -> None:
     root = axes.get_figure(root=True)
     usual = axes.get_xlim(), axes.get_ylim()
     for _ in range(MOST_WIDENINGS):
-        root.draw_without_rendering()
+        for _ in range(2):  # a layout of axes at one scale is settled by the second
+            root.draw_without_rendering()
         box = axes.get_window_extent()
         names = np.array([text.get_window_extent().extents for text in axes.texts]).reshape(-1, 4)
         over = np.array([*(box.extents[:2] - names[:, :2].min(axis=0, initial=np.inf)),
@@ -146,8 +153,15 @@ def _make_room(axes: Any) -> None:
     axes.set(xlim=usual[0], ylim=usual[1])
 
 
-def _name_stretches(axes: Any, region: Region, points: Floats, loop: list[int], look: Look) -> None:
-    """Write the limit that forms each stretch of a border beside its middle, outside; short stretches have no room."""
+def _name_stretches(axes: Any, region: Region, points: Floats, loop: list[int], look: Look, dots: Floats) -> None:
+    """Write the limit that forms each stretch of a border beside it, outside, where it covers least of what is drawn.
+
+    Short stretches have no room.
+
+    Parameters
+    ----------
+    dots : on what is drawn (n, 2) [pixels].
+    """
     from matplotlib.patheffects import withStroke
 
     limit_of = dict(zip(map(tuple, region.faces.tolist()), region.face_limit.tolist(), strict=True))
@@ -156,20 +170,30 @@ def _name_stretches(axes: Any, region: Region, points: Floats, loop: list[int], 
         along = np.cumsum(np.linalg.norm(steps, axis=1))
         if along[-1] < SHORTEST_NAMED * np.linalg.norm(np.ptp(points, axis=0)):
             continue
-        middle = int(np.searchsorted(along, 0.5 * along[-1]))
-        outward = np.array([steps[middle, 1], -steps[middle, 0]]) / max(np.linalg.norm(steps[middle]), 1e-300)
-        axes.annotate(
-            limit_name(*region.limits[limit]),
-            points[corners[middle]] + 0.5 * steps[middle],
-            xytext=OFF * outward,
-            textcoords="offset points",
-            ha="left" if outward[0] > SIDEWAYS else "right" if outward[0] < -SIDEWAYS else "center",
-            va="bottom" if outward[1] > SIDEWAYS else "top" if outward[1] < -SIDEWAYS else "center",
-            fontsize=SMALL,
-            color=look.ink,
-            zorder=5,
-            path_effects=[withStroke(linewidth=2.0, foreground=look.paper)],
-        )
+        tried: list[tuple[int, int, Any]] = []
+        for share in SHARES:
+            place = int(np.searchsorted(along, share * along[-1]))
+            outward = np.array([steps[place, 1], -steps[place, 0]]) / max(np.linalg.norm(steps[place]), 1e-300)
+            name = axes.annotate(
+                limit_name(*region.limits[limit]),
+                points[corners[place]] + 0.5 * steps[place],
+                xytext=OFF * outward,
+                textcoords="offset points",
+                ha="left" if outward[0] > SIDEWAYS else "right" if outward[0] < -SIDEWAYS else "center",
+                va="bottom" if outward[1] > SIDEWAYS else "top" if outward[1] < -SIDEWAYS else "center",
+                fontsize=SMALL,
+                color=look.ink,
+                zorder=5,
+                path_effects=[withStroke(linewidth=2.0, foreground=look.paper)],
+            )
+            box = name.get_window_extent().padded(1.0)
+            covered = int(np.count_nonzero((dots > box.min).all(axis=1) & (dots < box.max).all(axis=1)))
+            tried.append((covered, len(tried), name))
+        best = min(tried)[2]
+        for *_, name in tried:
+            if name is not best:
+                name.remove()
+        best.set_bbox({"facecolor": look.paper, "edgecolor": "none", "pad": 0.5})
 
 
 def _draw_machine(axes: Any, skeleton: Skeleton, columns: list[int], look: Look) -> None:

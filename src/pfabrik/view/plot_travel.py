@@ -11,10 +11,10 @@ import numpy as np
 
 from ..answers.words import short_names
 from ..common.checks import require_method
-from ..common.drawing import SMALL, Theme, new_figure
+from ..common.drawing import SMALL, Theme, new_figure, round_length
 from ..errors import InvalidArgument
 from ..travel import Reach, Travel
-from .canvas import LEAST_SIZE, TITLE, checked_size, round_length, wrapped
+from .canvas import LEAST_SIZE, TITLE, checked_size, wrapped
 from .looks import Look, dress, look_of
 
 if TYPE_CHECKING:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -113,26 +114,28 @@ def plot_solid(
     words = f"each face in the colour of {which}; + is {started}{inside}"
     under = top - 0.2 / figure.get_size_inches()[1]
     figure.text(left, under, words, fontsize=SMALL, color=look.soft, ha="left", va="top")
-    key = _key(groups, look)
+    seen = np.max([sample.shares(each.eye, colours.place) for each in (first, second) if each is not None], axis=0)
+    hidden = [group for group, share in zip(groups, seen, strict=True) if share < HIDDEN and group.share > SHOWN]
+    key = _key(groups, look, hidden)
     columns = min(len(key["handles"]), KEYS)
     figure.legend(loc="lower left", bbox_to_anchor=(0.5 * left, 0.0), ncols=columns, **key)
     return axes  # type: ignore[no-any-return]
 
 
-def _key(groups: list[Group], look: Look) -> dict[str, Any]:
-    """Settings of a key: stops of motors, then passive joints, then links, the rest last, each with its share."""
+def _key(groups: list[Group], look: Look, hidden: Sequence[Group] = ()) -> dict[str, Any]:
+    """Settings of a key: stops of motors, then passive joints, then links, the rest last, each with its share.
+
+    Those that are hidden, as within a shell, say so.
+    """
     from matplotlib.patches import Patch
 
     order = sorted(
         groups, key=lambda group: (not group.is_motors, group.is_links, group.name[0].isdigit(), -group.share)
     )
     shown = [group for group in order if group.share >= LEAST]
-    handles = [
-        Patch(
-            facecolor=group.colour, edgecolor=look.ink, linewidth=0.5, label=f"{group.name}  {100 * group.share:.0f} %"
-        )
-        for group in shown
-    ]
+    words = [f"{group.name}{', hidden' * (group in hidden)}  {100 * group.share:.0f} %" for group in shown]
+    style: dict[str, Any] = {"edgecolor": look.ink, "linewidth": 0.5}
+    handles = [Patch(facecolor=group.colour, label=label, **style) for group, label in zip(shown, words, strict=True)]
     letters = {"fontsize": SMALL, "labelcolor": look.ink}
     return {"handles": handles, "frameon": False, "handlelength": 1.2, "columnspacing": 1.4, **letters}
 

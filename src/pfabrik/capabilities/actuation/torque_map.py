@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...common.arrays import Floats, Mask
-from ...common.drawing import ACHIEVED, SHADE, SMALL, new_figure
+from ...common.drawing import ACHIEVED, SHADE, SMALL, new_figure, round_length
 from ...errors import InvalidArgument
 from ...tolerances import TOLERANCES
 from .drive_limits import HalfSpaces, clipped, image_of_box
@@ -22,6 +22,9 @@ PALE = (1.0, 1.0, 1.0, 0.5)
 
 FINE, COARSE = 121, 7
 """Points a side at which the weakest torque is coloured, and at which a polygon is drawn."""
+
+BELOW = 0.18
+"""Distance of the scale of polygons below the map, as a share of its height."""
 
 USUAL = 0.8
 """Share of the polygons that fit between their neighbours; larger ones, as near dead points, are cut off there."""
@@ -55,13 +58,32 @@ def plot_torque_map(placer: Placer, torque_max: Any, box: Any, ax: Axes | None =
     axes.set(xlabel=f"{names[0]} [{axis_unit}]", ylabel=f"{names[1]} [{axis_unit}]")
     lost = 1.0 - feasible.mean()
     motors = ", ".join(f"{limit:g}" for limit in dict.fromkeys(limits.tolist()))
-    size = " and ".join(f"{torque:.3g}" for torque in fits)
     axes.set_title(
-        f"{placer.mechanism.name}: torques of joints by actuators of {motors}\n"
-        f"polygons: {size} {unit} each way fit between two; out of reach: {lost:.1%} of the range",
+        f"{placer.mechanism.name}: torques of joints by actuators of {motors}\nout of reach: {lost:.1%} of the range",
         fontsize=SMALL,
     )
+    if fits.all():
+        _draw_scale(axes, fits, np.array([edge[[0, -1]] for edge in edges]), unit)
     return axes
+
+
+def _draw_scale(axes: Axes, fits: Floats, ends: Floats, unit: str) -> None:
+    """Draw a corner below the map whose sides are torques as polygons have them, and say which.
+
+    Parameters
+    ----------
+    fits : the torques that half the distance between two polygons is, (2,).
+    ends : of the map, least and greatest of both coordinates, (2, 2).
+    """
+    torques = np.array([round_length(torque) for torque in fits])
+    (left, right), (low, high) = ends
+    across, up = 0.5 * torques / fits * np.ptp(ends, axis=1) / COARSE
+    below = low - BELOW * (high - low)
+    axes.plot([right - across, right, right], [below, below, below + up], color=ACHIEVED, linewidth=1.6, clip_on=False)
+    alike = f"{torques[0]:g} {unit}" if torques[0] == torques[1] else f"{torques[0]:g} and {torques[1]:g} {unit}"
+    beside: dict[str, Any] = {"ha": "right", "va": "center", "fontsize": SMALL}
+    axes.text(right - across - 0.01 * (right - left), below + 0.5 * up, f"polygons: {alike} each way", **beside)
+    axes.set(xlim=(left, right), ylim=(low, high))
 
 
 def _draw_polygons(axes: Axes, placer: Placer, limits: Floats, low: Floats, high: Floats, shown: Any) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -53,7 +53,14 @@ def _residuals(ax: Axes, calibration: Calibration) -> None:
     ax.set_xlabel("measurement", fontsize=SMALL)
     ax.set_ylabel(f"residual [{calibration.residual_unit}]", fontsize=SMALL)
     ax.tick_params(labelsize=SMALL)
-    ax.legend(fontsize=SMALL, frameon=False)
+    above: dict[str, Any] = {
+        "loc": "lower left",
+        "bbox_to_anchor": (0.0, 1.0),
+        "borderaxespad": 0.0,
+        "ncols": 2,
+        "columnspacing": 1.0,
+    }
+    ax.legend(fontsize=SMALL, frameon=False, handletextpad=0.1, **above)
 
 
 def _changes(ax: Axes, calibration: Calibration) -> None:
