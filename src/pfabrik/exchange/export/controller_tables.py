@@ -36,10 +36,10 @@ from ...kernels.pose.tables import EXACTLY, NEAREST, QUESTION, Question, Start, 
 from ...kinematics import JointPath, Model, model_of, task_of, tilt_axis
 from ...machine.decomposition.leg_table import COMPLETED_WITHIN
 from ...machine.files.units import metres_of
+from ...machine.moved_bodies import FIRST_MOVED, Motion, angles_needed
 from ...options import Options
 from .driven_bodies import frames_on_bodies
 from .machine_data import Machine
-from .moved_bodies import FIRST_MOVED, Motion, angles_needed
 
 NEAR = 0.5
 """Largest step of implicit joints on the way to a target [L or rad]: more than one pose may close."""

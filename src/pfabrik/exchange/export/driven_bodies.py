@@ -10,8 +10,8 @@ from ...common.arrays import Floats
 from ...kinematics import cut_loops, inertias_of
 from ...machine.description.mechanism import Mechanism
 from ...machine.files.units import metres_of
+from ...machine.moved_bodies import FIRST_MOVED, WITH_BASE_END, Motion, MovedBodies
 from ...tolerances import TOLERANCES
-from .moved_bodies import FIRST_MOVED, WITH_BASE_END, Motion, MovedBodies
 
 
 def frames_on_bodies(mechanism: Mechanism, bodies: MovedBodies) -> list[int]:

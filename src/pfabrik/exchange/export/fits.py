@@ -60,13 +60,9 @@ def struts_of(machine: Machine) -> list[tuple[Floats, Floats, float]] | None:
         return None
     if any(leg.record["reversed"] or leg.record["proximal"] != K.NO_PROXIMAL for leg in legs):
         return None
-    ends = [(np.asarray(leg.numbers["base_end"]), np.asarray(leg.numbers["platform_end"])) for leg in legs]
-    offsets = [driven.home - _length(leg) for driven, leg in zip(machine.driven, legs, strict=True)]
+    ends = [(leg.of("base_end_point"), leg.of("platform_end_point")) for leg in legs]
+    offsets = [driven.home - float(leg.of("length")) for driven, leg in zip(machine.driven, legs, strict=True)]
     return [(*driven, offset) for driven, offset in zip(ends, offsets, strict=True)]
-
-
-def _length(leg: ExportedLeg) -> float:
-    return float(np.asarray(leg.numbers["length"]))
 
 
 def _pair(machine: Machine, driven: Coordinate, proximal: int) -> tuple[ExportedLeg, ExportedLeg] | None:
@@ -85,9 +81,9 @@ def towers_of(machine: Machine) -> list[Tower] | None:
         pair = _pair(machine, driven, K.CARRIAGE)
         if pair is None:
             return None
-        axis = np.asarray(pair[0].numbers["axis"]) * driven.sense
-        offsets = [np.asarray(leg.numbers["base_end"]) - np.asarray(leg.numbers["platform_end"]) for leg in pair]
-        lengths = [_length(leg) for leg in pair]
+        axis = pair[0].record["proximal_axis"] * driven.sense
+        offsets = [leg.of("base_end_point") - leg.of("platform_end_point") for leg in pair]
+        lengths = [float(leg.of("length")) for leg in pair]
         difference = max(np.abs(offsets[0] - offsets[1]).max() / size, abs(lengths[0] - lengths[1]) / size)
         if (
             difference > TOLERANCES.alignment
@@ -123,9 +119,9 @@ def _thigh(machine: Machine, driven: Coordinate, either_way: bool) -> Thigh | No
     pair = _pair(machine, driven, K.CRANK)
     if pair is None:
         return None
-    axis, crank = (np.asarray(pair[0].numbers[name]) for name in ("axis", "crank"))
-    knees = [np.asarray(leg.numbers["base_end"]) for leg in pair]
-    ankles = [np.asarray(leg.numbers["platform_end"]) for leg in pair]
+    axis, crank = pair[0].record["proximal_axis"], pair[0].of("crank")
+    knees = [leg.of("base_end_point") for leg in pair]
+    ankles = [leg.of("platform_end_point") for leg in pair]
     misalignment = np.cross(axis, knees[1] - knees[0])
     difference = max(np.abs((knees[1] - knees[0]) - (ankles[1] - ankles[0])).max(), np.linalg.norm(misalignment)) / size
     knee, ankle = 0.5 * (knees[0] + knees[1]), 0.5 * (ankles[0] + ankles[1])
@@ -142,6 +138,6 @@ def _thigh(machine: Machine, driven: Coordinate, either_way: bool) -> Thigh | No
     if to_ankle @ down <= 0.0 or not is_outside:
         return None
     angle = math.atan2(crank @ down, crank @ outward)
-    shin = _length(pair[0])
+    shin = float(pair[0].of("length"))
     least, most = sorted((angle + sense * driven.lo, angle + sense * driven.hi))
     return Thigh(hip, ankle, float(np.linalg.norm(crank)), shin, sense * driven.home - angle, least, most)

@@ -19,8 +19,9 @@ from ...kinematics import JointPath, generic_of, joint_path, model_of, require_d
 from ...machine.decomposition.leg_forms import RedundantJoint, Rod
 from ...machine.decomposition.leg_table import LegTable
 from ...machine.description.mechanism import Mechanism
+from ...machine.moved_bodies import Motion, MovedBodies
 from ...options import USUAL
-from .moved_bodies import ExportedLinks, Motion, MovedBodies, exported_links
+from .exported_links import ExportedLinks, exported_links
 
 PURPOSE = "exported"
 
@@ -77,13 +78,19 @@ class ExportedLeg(NamedTuple):
     ----------
     main : the leg whose proximal joint it is on; its own place if it shares none.
     record : as in `LegTable.legs`; lengths in L.
-    numbers : constants by the name of their field in C, in the mechanism's unit.
+    numbers : constants by the name of their field in a file of tensors, in the mechanism's unit.
+    size : L [length].
     """
 
     main: int
     record: Record
     numbers: dict[str, Number]
     joints: tuple[str, ...]
+    size: float
+
+    def of(self, name: str) -> Floats:
+        """A field of the record that is a length or a place, in the mechanism's unit."""
+        return np.asarray(self.record[name] * self.size)
 
     @property
     def is_pivot(self) -> bool:
@@ -222,9 +229,8 @@ def _legs(mechanism: Mechanism, table: LegTable) -> list[ExportedLeg]:
             numbers = _rod_numbers(form, record, length)
         else:
             numbers = (_redundant_numbers if isinstance(form, RedundantJoint) else _pivot_numbers)(record, length)
-        legs.append(
-            ExportedLeg(first, record, numbers, tuple(dict.fromkeys(element.joint.name for element in form.elements)))
-        )
+        joints = tuple(dict.fromkeys(element.joint.name for element in form.elements))
+        legs.append(ExportedLeg(first, record, numbers, joints, length))
     return legs
 
 

@@ -13,13 +13,13 @@ from ...machine.description.joints import Joint
 from ...machine.description.mechanism import Mechanism
 from ...machine.description.sketch import joint_places, middle
 from ...machine.files.units import metres_of
+from ...machine.moved_bodies import BASE, FIRST_MOVED, PLATFORM, TURNS, Motion
 from ...view.drawn_parts import Part, Place, parts_of, size_of
 from ...view.page.posed_drawing import THICKNESS
 from ..interop.names import unique
 from ..interop.urdf_tree import UrdfTree, kind_of_joint, left_out
 from ..interop.xml_reading import number_text
 from .machine_data import Machine
-from .moved_bodies import BASE, FIRST_MOVED, PLATFORM, TURNS, Motion
 
 TILTS, TILTS_NEXT = 2, 3
 """Kinds of the two hinges that aim a rod between balls, after SLIDES and TURNS; see `coordinate` in platform.hpp."""

@@ -8,11 +8,11 @@ import numpy as np
 
 from ...capabilities.clearance.solid_meshes import solids_of
 from ...common.arrays import Floats
-from ...kinematics import Model, columns, links_of, plane_of
+from ...kinematics import Model, links_of, plane_of
 from ...machine.common_centre import common_centre
-from ...machine.description.home_mobility import joint_screws
 from ...machine.description.mechanism import Joint, Mechanism
 from ...machine.description.sketch import joint_places, joints_on
+from ...machine.moved_bodies import MovedBodies
 from ..drawn_parts import Part, Place, hangs, home_rail, parts_of, role_of, size_of
 
 THICKNESS = 0.0125
@@ -31,45 +31,13 @@ class _Drawing:
     def __init__(self, model: Model) -> None:
         self.mechanism, self.length = model.mechanism, model.length
         self.home = joint_places(self.mechanism, None, self.mechanism.home_pose[:3, 3])
-        self.known = {int(column) for column in model.legs.known["column"]}
-        self.known |= {drive.column for drive in self.mechanism.drives}
-        self.frames: list[list[Any]] = []
-        self.bodies = self._bodies()
+        moved = MovedBodies(self.mechanism)
+        self.bodies = {body: moved.number(body) for body in self.mechanism.bodies if moved.is_placed(body)}
+        self.frames = [[each.on, [each.column, each.sign, *each.screw(self.length)]] for each in moved.motions]
         self.points: list[dict[str, Any]] = []
         self.indices: dict[Any, int] = {}
         for joint in sorted(self.mechanism.joints, key=lambda joint: joint.at is None):
             self.indices[joint.name] = self._add(self._joint(joint) | {"joint": joint.name})
-
-    def _bodies(self) -> dict[str, int]:
-        """The frame of every body that known coordinates place: 0 the base, 1 the platform, then `frames`."""
-        mechanism = self.mechanism
-        bodies = {mechanism.base: 0}
-        if not mechanism.end_effector_is_joint:
-            bodies[mechanism.end_effector_body] = 1
-        placed = list(bodies)
-        for body in placed:  # which grows
-            for joint in mechanism.joints:
-                motions = self._motions(joint)
-                if body not in joint.connects or motions is None:
-                    continue
-                first, second = joint.connects
-                other, signed = (second, motions) if body == first else (first, _backward(motions))
-                if other not in bodies:
-                    bodies[other] = 2 + len(self.frames)
-                    self.frames.append([bodies[body], *signed])
-                    placed.append(other)
-        return bodies
-
-    def _motions(self, joint: Joint) -> list[list[Any]] | None:
-        """Column, sign and screw of what moves a joint's second body; None where a coordinate is not known."""
-        if joint.is_rigid:
-            return []
-        span = columns(self.mechanism)[joint.name]
-        its_columns = range(span.start, span.stop)
-        if joint.type == "spherical" or not self.known.issuperset(its_columns):
-            return None
-        screws: list[list[float]] = joint_screws(self.mechanism, joint).tolist()
-        return [[column, 1, screw[:3], screw[3:]] for column, screw in zip(its_columns, screws, strict=True)]
 
     def _joint(self, joint: Joint) -> dict[str, Any]:
         """A point of a body, or amid others."""
@@ -155,10 +123,6 @@ class _Drawing:
                 mesh = {"kind": "mesh", "frame": frame, "vertices": vertices, "faces": solid.faces.ravel().tolist()}
                 out.append(common | mesh | {"radius": 1.0})
         return out
-
-
-def _backward(motions: list[list[Any]]) -> list[list[Any]]:
-    return [[column, -sign, *screw] for column, sign, *screw in reversed(motions)]
 
 
 def _normal(points: list[Floats]) -> Floats:

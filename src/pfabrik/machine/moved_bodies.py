@@ -1,4 +1,4 @@
-"""Bodies and links as an exported file places them, from the pose and from coordinates of legs."""
+"""Bodies whose places follow from the pose and from coordinates of legs, for exported files and for pages."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Floats
-from ...engines.joints.placed_links import link_limits
-from ...errors import UnsupportedMechanism
-from ...kernels.clearance.link_records import LinkLimits
-from ...kernels.clearance.solids import BOX, CAPSULE, DISC, KIND
-from ...kernels.legs import records as K
-from ...kinematics import links_of, model_of
-from ...machine.decomposition.leg_forms import LegForm, Rod
-from ...machine.description.home_mobility import universal_axes
-from ...machine.description.joints import Joint
-from ...machine.description.mechanism import Mechanism
-from ...tolerances import TOLERANCES
+from ..common.arrays import Floats
+from ..kernels.clearance.solids import CAPSULE, DISC, KIND
+from ..kernels.legs import records as K
+from ..tolerances import TOLERANCES
+from .decomposition.leg_forms import LegForm, Rod
+from .description.home_mobility import joint_screws
+from .description.joints import Joint
+from .description.links import links_of
+from .description.mechanism import Mechanism
+from .model import model_of
+from .motion.displacements import columns
 
 BASE, PLATFORM, FIRST_MOVED = 0, 1, 2
 """Numbers of bodies in the exported file: those that move with joint coordinates follow."""
@@ -57,6 +56,12 @@ class Motion(NamedTuple):
     sign: float
     body: str
 
+    def screw(self, size: float) -> tuple[list[float], list[float]]:
+        """Angular velocity, and velocity at the origin [L], by a unit of the coordinate; `size` is L [length]."""
+        if self.kind == SLIDES:
+            return [0.0, 0.0, 0.0], self.axis.tolist()
+        return self.axis.tolist(), np.cross(self.point / size, self.axis).tolist()
+
 
 class MovedBodies:
     """The bodies whose places follow from the pose and from coordinates of legs, each numbered when it is needed.
@@ -74,7 +79,6 @@ class MovedBodies:
         self.numbers = {mechanism.base: BASE}
         if not mechanism.end_effector_is_joint:
             self.numbers[mechanism.end_effector] = PLATFORM
-        self._columns = {(each.joint.name, each.place): each.column for each in mechanism.coordinates}
         self._ways, self._lengths = self._shortest_ways([*self.numbers])
 
     @property
@@ -188,32 +192,27 @@ class MovedBodies:
         return ways, lengths
 
     def _n_coordinates(self, joint: Joint) -> int:
-        return 0 if joint.is_rigid else len(self._places(joint))
+        return 0 if joint.is_rigid else len(self._columns(joint))
 
-    def _places(self, joint: Joint) -> list[int]:
-        return [place for name, place in self._columns if name == joint.name]
+    def _columns(self, joint: Joint) -> range:
+        span = columns(self._mechanism)[joint.name]
+        return range(span.start, span.stop)
 
     def _follows(self, joint: Joint) -> bool:
         """True if legs have all coordinates of a joint; they have none of a ball, nor of a joint cut at its centre."""
         mechanism = self._mechanism
         is_cut = mechanism.end_effector_is_joint and joint.name == mechanism.end_effector
-        known = all(self._columns[joint.name, place] in self._known for place in self._places(joint))
+        known = self._known.keys() >= {*self._columns(joint)}
         return joint.is_rigid or (known and not is_cut and joint.type != "spherical")
 
     def _motions(self, joint: Joint, forward: bool) -> list[Motion]:
         """The motions of a joint's second body relative to its first, or the other way round, outward."""
         if joint.is_rigid:
             return []
-        mechanism, places = self._mechanism, self._places(joint)
-        if joint.type == "universal":
-            axes, kinds = [*universal_axes(mechanism, joint)], [TURNS, TURNS]
-        else:
-            axes = [np.array(mechanism.home_axis(joint.name))] * len(places)
-            kinds = [SLIDES if joint.type == "prismatic" else TURNS, SLIDES][: len(places)]
-        point = np.array(mechanism.reference_point if joint.at is None else joint.at)
-        motions = []
-        for place, axis, kind in zip(places, axes, kinds, strict=True):
-            column, sign = self._columns[joint.name, place], 1.0 if forward else -1.0
+        point = np.array(self._mechanism.reference_point if joint.at is None else joint.at)
+        sign, motions = 1.0 if forward else -1.0, []
+        for column, screw in zip(self._columns(joint), joint_screws(self._mechanism, joint), strict=True):
+            kind, axis = (TURNS, screw[:3]) if screw[:3].any() else (SLIDES, screw[3:])
             record = self._known[column]
             leg, at, sense = int(record["leg"]), int(record["place"]), float(record["sense"]) * sign
             motions.append(Motion(BASE, kind, leg, at, sense, axis, point, joint.name, column, sign, ""))
@@ -230,80 +229,6 @@ def _end_with(form: LegForm, body: str) -> tuple[int, str] | None:
     if body == (slide.outward if slide is not None else last.inward):
         return WITH_PLATFORM_END, last.joint.name
     return None
-
-
-class ExportedLinks(NamedTuple):
-    """The links of a machine, and the pairs that stay apart.
-
-    Attributes
-    ----------
-    limits : in L; `bodies` are those of the motions, as `MovedBodies` numbers them.
-    names : of the bodies of each pair.
-    """
-
-    motions: list[Motion]
-    limits: LinkLimits
-    names: list[tuple[str, str]]
-
-
-def exported_links(mechanism: Mechanism, bodies: MovedBodies) -> ExportedLinks | None:
-    """The links of a mechanism with a clearance; None without one.
-
-    Parameters
-    ----------
-    bodies : of the mechanism; those that links are on are numbered.
-
-    Raises
-    ------
-    UnsupportedMechanism : the place of some link follows from no coordinates of legs, or its shape has no code here.
-    """
-    if mechanism.clearance is None:
-        return None
-    links = links_of(mechanism)
-    used = np.unique(links.pairs).tolist()
-    reasons = [reason for solid in used for reason in _faults(mechanism, solid, bodies)]
-    if reasons:
-        raise UnsupportedMechanism(mechanism.name, reasons, "exported with its clearance")
-    ends = np.full((len(links.sizes), 2), BASE)
-    for solid in used:
-        ends[solid] = _bodies_of(mechanism, solid, bodies)
-    names = [(mechanism.shapes[i].body, mechanism.shapes[j].body) for i, j in links.pairs.tolist()]
-    return ExportedLinks(bodies.motions, link_limits(mechanism, ends, 0.0), names)
-
-
-WHAT_TO_DO = "or name its pairs in `ignore`, or export without the part 'limits'"
-
-
-def _faults(mechanism: Mechanism, solid: int, bodies: MovedBodies) -> Iterator[str]:
-    """The reason why a solid cannot be exported, if there is one."""
-    links, shape = links_of(mechanism), mechanism.shapes[solid]
-    if int(links.sizes[solid, KIND]) not in (CAPSULE, BOX, DISC):
-        yield f"body '{shape.body}' is a {shape.kind}, which has no code here: give it another shape, {WHAT_TO_DO}"
-        return
-    for name in links.joints[solid]:
-        if bodies.of_centre(mechanism.joint(name)) is None:
-            yield (
-                f"body '{shape.body}' ends at joint '{name}', whose place follows from no leg: name other joints in "
-                f"`between`, {WHAT_TO_DO}"
-            )
-    if not links.joints[solid] and not bodies.is_placed(shape.body) and bodies.along_rod(solid) is None:
-        yield (
-            f"body '{shape.body}' turns in ways that no leg has in closed form: name two joints in `between`, or put "
-            f"its shape on the line of its rod, {WHAT_TO_DO}"
-        )
-
-
-def _bodies_of(mechanism: Mechanism, solid: int, bodies: MovedBodies) -> tuple[int, int]:
-    joints = links_of(mechanism).joints[solid]
-    if not joints:
-        body = mechanism.shapes[solid].body
-        number = bodies.number(body) if bodies.is_placed(body) else bodies.along_rod(solid)
-        assert number is not None
-        return number, number
-    first, second = (bodies.of_centre(mechanism.joint(name)) for name in joints)
-    assert first is not None
-    assert second is not None
-    return first, second
 
 
 def angles_needed(motions: Sequence[Motion], leg: int, start: int) -> bool:
