@@ -6,30 +6,11 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
-from pfabrik import Joint, Mechanism, Options, Status
+from machines.small import PINS, four_bar, gripper
+from pfabrik import Options, Status
 
 Z = (0, 0, 1)
-PIVOT, CRANK, ROD, PAD = np.array([16.0, 16]), np.array([26.0, 11]), np.array([6.0, -10]), np.array([36.0, 62])
-PINS = {
-    "rod0": (*ROD, "carriage", "rod"),
-    "rod1": (*CRANK, "rod", "driver"),
-    "drv0": (*PIVOT, "body", "driver"),
-    "drv1": (*PAD, "driver", "pad"),
-    "fol0": (6, 21, "body", "follow"),
-    "fol1": (26, 67, "follow", "pad"),
-}
-"""Of one finger: where its pins are, and what they join."""
-
-
-def gripper(sides: int, balls: tuple[str, ...]) -> Mechanism:
-    """A slide that drives fingers by rods, each with its pad on a parallelogram, mirrored; some pins are balls."""
-    joints = [Joint("slide", "prismatic", ("body", "carriage"), axis=(0, 1, 0), range=(-12, 12), actuated=True)]
-    for sign, k in ((-1, "L"), (1, "R"))[:sides]:
-        for name, (x, y, *bodies) in PINS.items():
-            one, other = (body if body in ("body", "carriage") else body + k for body in bodies)
-            kind = {"type": "spherical"} if name in balls else {"type": "revolute", "axis": Z}
-            joints.append(Joint(name + k, connects=(one, other), at=(sign * x, y, 0), **kind))
-    return Mechanism("gripper", joints, "padL", (-30, 92, 0), base="body", task=("x",))
+PIVOT, CRANK, ROD, PAD = (np.array(PINS[name][:2], float) for name in ("drv0", "rod1", "rod0", "drv1"))
 
 
 def end_of_travel() -> float:
@@ -67,23 +48,10 @@ def test_fingers_end_where_a_rod_is_in_line_with_its_crank(sides: int, balls: tu
     np.testing.assert_allclose(there_and_back.q[-1][pinned], 0.0, atol=1e-9)
 
 
-def four_bar(kinds: tuple[str, str], pins: list[tuple[float, float]], driven: str) -> Mechanism:
-    """A crank, a coupler and a rocker in a plane; the coupler is on pins or balls, the crank is the end effector."""
-    bodies = ("base", "one"), ("one", "rod"), ("rod", "two"), ("base", "two")
-    joints = []
-    for name, kind, connects, (x, y) in zip("ABCD", ("revolute", *kinds, "revolute"), bodies, pins, strict=True):
-        axis = {"axis": Z, "actuated": name == driven} if kind == "revolute" else {}
-        joints.append(Joint(name, kind, connects, at=(x, y, 0), **axis))
-    return Mechanism("four-bar", joints, "one", (*pins[1], 0), task=("yaw",))
-
-
-PINNED, SPUN = ("revolute", "revolute"), ("spherical", "spherical")
-
-
-@pytest.mark.parametrize("kinds", [PINNED, SPUN, ("revolute", "spherical")])
-def test_a_drag_link_turns_fully(kinds: tuple[str, str]) -> None:
+@pytest.mark.parametrize("balls", ["", "BC", "C"])
+def test_a_drag_link_turns_fully(balls: str) -> None:
     """Grashof: the ground is the shortest link, so there is no dead point, though the coupler turns far on balls."""
-    machine = four_bar(kinds, [(0, 0), (45, 0), (40, -20), (3, 6)], "A")
+    machine = four_bar((0, 0), (45, 0), (40, -20), (3, 6), end="crank", at=(45, 0), balls=balls, task=("yaw",))
     home = pf.solve_fk(machine, [0.0])
     assert all(np.isinf(each.distance) for each in pf.travel(home, about=[Z, (0, 0, -1)]))
     turns = pf.pose(np.zeros((18, 3)), rpy=np.radians(np.arange(0, 360, 20.0))[:, None] * np.array(Z))
@@ -99,7 +67,9 @@ def test_balls_for_pins_change_no_travel(seed: int, driven: str) -> None:
     rng = np.random.default_rng(seed)
     for _ in range(6):
         pins = [(0.0, 0.0), *map(tuple, rng.uniform(-60, 60, (3, 2)))]
-        machines = [four_bar(kinds, pins, driven) for kinds in (PINNED, SPUN)]
+        machines = [
+            four_bar(*pins, end="crank", at=pins[1], balls=balls, driven=driven, task=("yaw",)) for balls in ("", "BC")
+        ]
         ends = [pf.travel(pf.solve_fk(machine, [0.0]), about=[Z, (0, 0, -1)]) for machine in machines]
         pinned, spun = (np.array([each.distance for each in of_one]) for of_one in ends)
         np.testing.assert_allclose(spun, pinned, atol=1e-4)

@@ -11,6 +11,7 @@ import pytest
 import exported
 import pfabrik as pf
 from checks import INTERPRETED
+from machines.small import four_bar, gripper
 from pfabrik import Mechanism, Status
 from pfabrik.exchange.export.export_c import c_source
 from pfabrik.kernels.controller.reached import OTHER_MODE
@@ -21,12 +22,6 @@ Z, Y = (0, 0, 1), (0, 1, 0)
 
 def hinge(name: str, inner: str, outer: str, at: np.ndarray, **more: object) -> pf.Joint:
     return pf.Joint(name, "revolute", (inner, outer), at=(*at, 0), axis=Z, **more)
-
-
-def four_bar(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> Mechanism:
-    joints = [hinge("A", "base", "crank", A, actuated=True), hinge("B", "crank", "coupler", B)]
-    joints += [hinge("C", "coupler", "rocker", C), hinge("D", "base", "rocker", D)]
-    return Mechanism("four-bar", joints, "rocker", (*C, 0))
 
 
 def rocker_angles(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, cranks: np.ndarray) -> np.ndarray:
@@ -184,23 +179,6 @@ def test_exported_forward_kinematics_goes_there_too(make: Callable[[], Mechanism
     told = answers.fk == 0
     assert np.isin(answers.fk[reached], (0, OTHER_MODE)).all() and (told & reached).sum() >= 5
     np.testing.assert_allclose(answers.back[told & reached], there[told & reached], atol=1e-6)
-
-
-def gripper(fingers: int) -> Mechanism:
-    """A slide, a rod for each finger, and pads on parallelograms: all come to their dead points at once."""
-    joints = [pf.Joint("slide", "prismatic", ("body", "carriage"), axis=(0, 1, 0), range=(-12, 12), actuated=True)]
-    for side, k in ((-1, "L"), (1, "R"))[:fingers]:
-        for name, x, y, inner, outer in (
-            ("rod0", 6, -10, "carriage", "rod"),
-            ("rod1", 26, 11, "rod", "driver"),
-            ("drv0", 16, 16, "body", "driver"),
-            ("drv1", 36, 62, "driver", "pad"),
-            ("fol0", 6, 21, "body", "follow"),
-            ("fol1", 26, 67, "follow", "pad"),
-        ):
-            bodies = [each if each in ("body", "carriage") else each + k for each in (inner, outer)]
-            joints.append(hinge(name + k, *bodies, np.array([side * x, y])))
-    return Mechanism("gripper", joints, "padL", (-30, 92, 0), base="body", task=("x",))
 
 
 def test_dead_points_of_several_loops_at_once_are_dead_points() -> None:

@@ -12,6 +12,7 @@ import machines
 import pfabrik as pf
 from checks import INTERPRETED, actuator_units, assert_feasible, home_values
 from machines import closure, machine
+from machines.small import four_bar
 from oracles import any_values
 from pfabrik import Joint, Mechanism, Options, Solution, Status
 from pfabrik.engines.pose.answers import sides_at
@@ -285,14 +286,7 @@ def test_legs_with_loops_reach_in_another_mode_what_no_start_leads_to() -> None:
 
 def crank_in_a_four_bar() -> Mechanism:
     """It does not go all round; one place along its coupler is asked for."""
-    z = (0, 0, 1)
-    joints = [
-        Joint("A", "revolute", ("base", "a"), at=(0, 0, 0), axis=z, actuated=True),
-        Joint("B", "revolute", ("a", "coupler"), at=(0, 80, 0), axis=z),
-        Joint("C", "revolute", ("coupler", "c"), at=(100, 80, 0), axis=z),
-        Joint("D", "revolute", ("c", "base"), at=(120, 0, 0), axis=z),
-    ]
-    return Mechanism("crank in a four-bar", joints, "coupler", (60, 80, 0), task=("x",))
+    return four_bar((0, 0), (0, 80), (100, 80), (120, 0), end="coupler", at=(60, 80), task=("x",))
 
 
 @pytest.mark.parametrize("name", ["rrr", "reachy_mini", "canfield", "crank"])

@@ -18,6 +18,7 @@ import pytest
 
 import pfabrik as pf
 from machines import MACHINES, planar, tripod_rps
+from machines.small import slides
 from pfabrik.errors import InvalidArgument, MissingLibrary, UnknownName
 from pfabrik.machine.common_centre import common_centre
 from pfabrik.machine.description.sketch import joint_places, joints_on, slider_place
@@ -41,13 +42,7 @@ TRIPOD, FIVE_BAR = tripod_rps(), pf.load("five_bar")
 
 
 def gantry(*axes: int) -> pf.Mechanism:
-    """Slides in a row: not one joint has a centre."""
-    bodies = ("base", "bridge", "trolley", "tool")
-    joints = [
-        pf.Joint(f"P{k}", "prismatic", bodies[place : place + 2], axis=np.eye(3)[k], actuated=True, range=(-5, 5))
-        for place, k in enumerate(axes)
-    ]
-    return pf.Mechanism("gantry", joints, bodies[len(axes)], (1, 2, 3), task=["xyz"[k] for k in axes])
+    return slides(*[(-5, 5)] * len(axes), axes=np.eye(3)[[*axes]])
 
 
 def circle_of(machine: pf.Mechanism, radius: float, steps: int = 12) -> pf.Track:

@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from command import pfabrik, told, write_files
 from machines import machine
+from machines.small import slides
 from pfabrik.errors import InvalidArgument
 
 Array = NDArray[np.float64]
@@ -39,17 +40,6 @@ def asked_for_all(name: str, point: Sequence[float] | None = None) -> pf.Mechani
 def off_centre() -> pf.Mechanism:
     """A machine whose end effector turns about a centre, at another point of it."""
     return asked_for_all("agile_eye", (0.0, 0.0, 30.0))
-
-
-def slides(*axes: Sequence[float], travel: float = 1.0) -> pf.Mechanism:
-    """Slides in a row along axes, not about their middles."""
-    bodies = ("base", *(f"slide{k}" for k in range(len(axes))))
-    ends = (-0.3 * travel, 0.7 * travel)
-    joints = [
-        pf.Joint(f"S{k}", "prismatic", bodies[k : k + 2], axis=axis, actuated=True, range=ends)
-        for k, axis in enumerate(axes)
-    ]
-    return pf.Mechanism("slides", joints, bodies[-1], (0, 0, 0), task=("x", "y", "z"))
 
 
 # The oracle
@@ -180,7 +170,7 @@ def test_coordinates_that_change_together_alone_are_named(
     axes: tuple[tuple[int, ...], ...], over: tuple[str, ...], words: str
 ) -> None:
     with pytest.raises(InvalidArgument, match=words):
-        pf.workspace(slides(*axes), over=over, resolution=0.2)
+        pf.workspace(slides(*[(-0.3, 0.7)] * len(axes), axes=axes), over=over, resolution=0.2)
 
 
 def test_a_cross_of_two_lines_has_no_size() -> None:
@@ -200,7 +190,7 @@ def test_what_the_tolerance_of_poses_leaves_is_no_size() -> None:
 @pytest.mark.parametrize("travel", [1.0, 1e-4, 1e-6])
 def test_a_map_may_be_as_small_as_its_ranges(travel: float) -> None:
     """Far below the cells, and what the tolerance of poses leaves across a parasitic motion."""
-    stage = slides((1, 0, 0), (0, 1, 0), travel=travel)
+    stage = slides(*[(-0.3 * travel, 0.7 * travel)] * 2, point=(0, 0, 0))
     assert pf.workspace(dataclasses.replace(stage, task=("x", "y"))).size == pytest.approx(travel**2, rel=1e-3)
 
 
