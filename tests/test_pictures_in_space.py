@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import pfabrik as pf
 from pfabrik.errors import InvalidArgument
@@ -19,7 +20,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from pfabrik.view.eye import Eye, upright
-from pfabrik.view.raster import lines_between, rasterised
+from pfabrik.view.raster import Raster, lines_between, rasterised
 from pfabrik.view.solid import SeenSolid, best_eye, picked_faces, scale_of, seen_solid
 
 OVER = {"rps": ["z", "tilt_x", "tilt_y"]}
@@ -38,6 +39,12 @@ def seen(region: pf.Workspace) -> SeenSolid:
     return seen_solid(region, best_eye(sample, upright(region.names)), 240)
 
 
+def centres(raster: Raster, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
+    """The centres of pixels, (n, 2), by their places in a flat image."""
+    row, column = np.divmod(pixels, raster.face.shape[1])
+    return np.asarray(raster.low + raster.pixel * np.stack([column, row], axis=1))
+
+
 @pytest.mark.parametrize("eye", [Eye(30.0, -60.0), Eye(-20.0, 110.0, (1, 2, 0))])
 def test_each_pixel_shows_the_nearest_face(eye: Eye) -> None:
     """Of a box: a ray leaves it where it leaves the first of three slabs."""
@@ -50,7 +57,7 @@ def test_each_pixel_shows_the_nearest_face(eye: Eye) -> None:
     for both_sides in (False, True):
         raster = rasterised(eye.seen(corners), faces, 120, both_sides=both_sides)
         pixels = np.arange(raster.face.size)
-        start = raster.centres(pixels) @ eye.axes[:2]
+        start = centres(raster, pixels) @ eye.axes[:2]
         hits = (ends[:, None] - start) / eye.axes[2]
         leaves, enters = hits.max(axis=0).min(axis=1), hits.min(axis=0).max(axis=1)
         depth = (
@@ -67,7 +74,7 @@ def test_a_pixel_has_the_limit_that_is_exceeded_just_outside(name: str) -> None:
     solid = seen(space_of(name))
     towards, pixels = solid.eye.axes[2], np.flatnonzero(solid.limit >= 0)
     pixels = pixels[np.random.default_rng(0).permutation(len(pixels))[:1000]]
-    at = solid.raster.centres(pixels) @ solid.eye.axes[:2] + solid.depth.ravel()[pixels, None] * towards
+    at = centres(solid.raster, pixels) @ solid.eye.axes[:2] + solid.depth.ravel()[pixels, None] * towards
     outside = pf.feasibility(
         solid.region.mechanism, solid.region.poses((at + 0.2 * solid.step * towards) / solid.scale)
     )

@@ -53,11 +53,6 @@ class Raster(NamedTuple):
         high = low + self.pixel * np.array([columns, rows])
         return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
-    def centres(self, rows: Ints) -> Floats:
-        """The centres of pixels, (n, 2), by their places in a flat image."""
-        row, column = np.divmod(rows, self.face.shape[1])
-        return self.low + self.pixel * np.stack([column, row], axis=1)
-
     def pixels(self, seen: Floats) -> tuple[tuple[Ints, Ints], Mask]:
         """Rows and columns of points (n, 2 or more), and the mask of those within the image; others are moved to it."""
         column, row = np.round((seen[:, :2] - self.low) / self.pixel).astype(np.int64).T
