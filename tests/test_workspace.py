@@ -27,13 +27,11 @@ from pfabrik.capabilities.workspace.border import (
     JOINT_COLOURS,
     LINK_COLOURS,
     MOTOR_COLOURS,
-    group_of_limits,
     groups_of,
     stems_of,
 )
 from pfabrik.capabilities.workspace.verdicts import MapQuestion
 from pfabrik.errors import InvalidArgument
-from pfabrik.view.border_parts import patches_of
 from pfabrik.view.eye import Eye
 from pfabrik.view.looks import look_of
 from pfabrik.view.solid import in_the_light
@@ -557,28 +555,6 @@ def test_of_limits_met_together_the_first_binds(name: str) -> None:
     assert len(first) > 100
     assert [told.limits[place] for place in told.binding] == [order[place] for place in first]
     np.testing.assert_allclose(told.margin, values.min(axis=0), atol=1.1e-9)
-
-
-def test_the_border_is_divided_where_one_motor_takes_over_from_another() -> None:
-    """At the dividing points two limits have no room left; at the vertices beside them only one of the two has none."""
-    found = pf.workspace(pf.load("five_bar"), resolution=8.0)
-    groups = groups_of(found)
-    place = group_of_limits(found, groups)
-    patches = patches_of(found, place)
-    ends = place[found.vertex_limit[found.faces]]
-    is_divided = ends[:, 0] != ends[:, 1]
-    assert len(patches.segments) == len(found.faces) + is_divided.sum() > len(found.faces)
-    whole, divided = (
-        np.linalg.norm(np.diff(points[pairs], axis=1), axis=2).sum()
-        for points, pairs in ((found.vertices, found.faces), (patches.vertices, patches.segments))
-    )
-    assert divided == pytest.approx(whole, rel=1e-12)
-    new = patches.vertices[len(found.vertices) : len(found.vertices) + is_divided.sum()]
-    margins = pf.margins(pf.solve_ik(found.mechanism, found.poses(new)))
-    second = np.sort(np.stack([np.abs(values) for values in margins.values()]), axis=0)[1]
-    changing = np.unique(found.faces[is_divided])
-    beside = pf.margins(pf.solve_ik(found.mechanism, found.poses(found.vertices[changing])))
-    assert second.max() < 0.5 * np.sort(np.stack(list(beside.values())), axis=0)[1].max()
 
 
 def test_a_window_is_looked_at_however_far_from_the_start_it_is_and_may_be_empty() -> None:

@@ -12,7 +12,6 @@ from ..capabilities.workspace.space import POSITIONS
 from ..capabilities.workspace.workspace_table import labels, shown
 from ..common.arrays import Floats
 from ..common.drawing import SMALL
-from .border_parts import patches_of
 from .canvas import draw_title, number_axes
 from .frame import dense, machine_of, title_of
 from .looks import Look
@@ -94,15 +93,13 @@ def _draw_plane(axes: Any, region: Region, groups: list[Group], look: Look) -> N
     from matplotlib.patches import PathPatch
 
     place = group_of_limits(region, groups)
-    patches = patches_of(region, place)
-    points = shown(region, patches.vertices)
-    group_of = dict(zip(map(tuple, patches.segments.tolist()), patches.groups.tolist(), strict=True))
-    for loop in loops_of(patches.segments):
+    group_of = dict(zip(map(tuple, region.faces.tolist()), place[region.face_limit].tolist(), strict=True))
+    loops, places = loops_of(region.faces), shown(region, region.vertices)
+    for loop in loops:
         for group, corners in stretches_of(loop, group_of):
             drawn = groups[group]
             style: Any = "-" if drawn.is_motors else DASHES
-            axes.plot(*points[corners].T, color=drawn.colour, linewidth=BORDER, linestyle=style, zorder=4)
-    loops, places = loops_of(region.faces), shown(region, region.vertices)
+            axes.plot(*places[corners].T, color=drawn.colour, linewidth=BORDER, linestyle=style, zorder=4)
     skeleton = machine_of(region)
     if skeleton is not None:
         _draw_machine(axes, skeleton, [POSITIONS.index(name) for name in region.names], look)
