@@ -7,7 +7,7 @@ import os
 import secrets
 import shutil
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from .checks import require_path
@@ -28,20 +28,15 @@ def whole_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     if final.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     part = final.with_name(f".{final.stem}.{secrets.token_hex(4)}.part{final.suffix}")  # of this writer alone
-    with ExitStack() as removals:
-        for _ in range(2):  # an interruption may come while it is removed
-            removals.callback(_remove, part)
-        try:
-            yield part
-            if final.exists():
-                shutil.copymode(final, part)
-            part.replace(final)
-        except OSError as error:
-            if str(error.filename) != str(part):
-                raise
-            raise OSError(error.errno, error.strerror, str(path)) from error
-
-
-def _remove(part: Path) -> None:
-    with suppress(OSError):
-        part.unlink()
+    try:
+        yield part
+        if final.exists():
+            shutil.copymode(final, part)
+        part.replace(final)
+    except OSError as error:
+        if str(error.filename) != str(part):
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
+    finally:
+        with suppress(OSError):
+            part.unlink()
