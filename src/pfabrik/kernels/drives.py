@@ -153,3 +153,12 @@ def go_to(drive: Record, value: float, dt: float) -> float:
 def rest_at(drive: Record, value: float) -> None:
     """Let a drive rest at a value."""
     drive["rate"], drive["value"] = 0.0, value
+
+
+@routine
+def ticks_left(drives: Records, dt: float) -> float:
+    """How many ticks the drives take at full speed to where they are on the target."""
+    ticks = 0.0
+    for i in range(drives.shape[0]):
+        ticks = max(ticks, abs(drives[i]["aim"] - drives[i]["value"]) / (drives[i]["speed"] * dt))
+    return ticks

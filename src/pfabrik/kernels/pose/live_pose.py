@@ -28,6 +28,7 @@ from ..drives import (
     rest_at,
     share_to_rest,
     slowed,
+    ticks_left,
     ticks_to_rest,
     ticks_to_target,
 )
@@ -44,20 +45,24 @@ from ..rows import INVALID, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
 from ..vectors import copy_row, copy_table, scale, vec, wrap
 from ..vectors import move as moved_by
 from .descend_pose import descend
-from .equations import PlatformState, evaluate_legs, has_proximal, new_platform_state
+from .equations import LegEvaluation, PlatformState, evaluate_legs, has_proximal, new_platform_state
 from .limits import place_links
 from .linearise import linearise
 from .nearest import PLAN, is_other_mode, pose_objective, turned_by
 from .pose_constants import BENT, STRETCHED
 from .search import SearchScratch, copy_platform_state, fix_held, move, new_search_scratch
 from .search_records import MultistartPlan, PlatformObjective
-from .starts import load_target, put_sides
+from .starts import load_target, place_proximal, put_sides
 
 AIM, WALK = 0, 1
 """The objectives of a live machine's plan: of the pose, and of drives that walk to values, or slow down."""
 
 QUADRATIC_PROGRAMMES = 2
 """Most steps of a tick."""
+
+
+DIRECT = 0.9
+"""Least share of a tick at full speed by which drives are to come nearer in it to a target that legs reach."""
 
 
 class LivePose(NamedTuple):
@@ -85,14 +90,23 @@ class LiveScratch(NamedTuple):
     measures: Floats  # (5,)
     trial: Floats  # (n_a,): actuators
     sides: Floats  # (legs,)
+    before: PlatformState  # where a tick began
+    aside: PlatformState  # where it might end
     no_values: Floats  # (0, n_a)
 
 
 def new_live_scratch(live: LivePose) -> LiveScratch:
     """Allocate the scratch memory of a tick."""
-    search, n = new_search_scratch(live.search, live.plan.links), len(live.drives)
+    search, n, legs = new_search_scratch(live.search, live.plan.links), len(live.drives), len(live.state.q)
     return LiveScratch(
-        new_completion(live.near), search, np.zeros(5), np.zeros(n), np.zeros(len(live.state.q)), np.zeros((0, n))
+        new_completion(live.near),
+        search,
+        np.zeros(5),
+        np.zeros(n),
+        np.zeros(legs),
+        new_platform_state(legs),
+        new_platform_state(legs),
+        np.zeros((0, n)),
     )
 
 
@@ -124,24 +138,22 @@ def put_ranges(own: LivePose, attempt: int, dt: float) -> None:
 
 
 @routine
-def put_where(own: LivePose, scratch: LiveScratch, state: PlatformState) -> None:
-    """Put proximal joints where a state has its legs; at dead points, a little to their sides, as far as drives go."""
-    table, leg_eval, q, sides = own.search, scratch.search.leg_eval, state.q, state.sides
-    drives, limited = own.drives, own.search.limited
-    first = limited.shape[0] - drives.shape[0]
+def bend(own: LivePose, state: PlatformState, leg_eval: LegEvaluation) -> None:
+    """Displace drives at dead points a little to their sides, as far as they go: see `starts.place_proximal`."""
+    table, q, sides, drives = own.search, state.q, state.sides, own.drives
+    first = table.limited.shape[0] - drives.shape[0]
     set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
-        leg, values = table.legs[k], leg_eval.values[k]
+        leg, values, room = table.legs[k], leg_eval.values[k], BENT
         place_frame(table.legs, k, q, leg_eval.frames, leg_eval.values)
         if has_proximal(leg) and sides[k] != 0.0:
             end = moved_by(leg_eval.frames[leg["frame"]], vec(leg["platform_end_point"]))
             solve_proximal(leg, end, -sides[k], values)
-            other = values[0]
+            other = values[Q_PROXIMAL]
             solve_proximal(leg, end, sides[k], values)
-            if abs(wrap(values[0] - other, 0.0)) < STRETCHED:
-                room = BENT
+            if abs(wrap(values[Q_PROXIMAL] - other, 0.0)) < STRETCHED:
                 for i in range(drives.shape[0]):
-                    if limited[first + i]["leg"] == k:
+                    if table.limited[first + i]["leg"] == k:
                         room = min(room, 0.5 * (drives[i]["most"] - drives[i]["least"]))
                 q[k] += room * sides[k]
 
@@ -257,7 +269,7 @@ def search_in_time(own: LivePose, scratch: LiveScratch, aim: int) -> bool:
     for k in range(kept_sides.shape[0]):
         kept_sides[k] = own.state.sides[k] if has_proximal(table.legs[k]) else 0.0
     copy_platform_state(own.state, search.best)
-    put_where(own, scratch, search.best)
+    bend(own, search.best, search.leg_eval)
     fix_held(pose, True, search)
     begin_effort(UNBOUNDED, UNBOUNDED, search.effort[0])
     if aim == AIM:
@@ -308,6 +320,33 @@ def measure_lag(own: LivePose, scratch: LiveScratch) -> None:
 
 
 @routine
+def left_of(own: LivePose, scratch: LiveScratch, dt: float) -> float:
+    """How many ticks drives take at full speed from where the state has them to where they are on the target."""
+    table, drives, ticks = own.search, own.drives, 0.0
+    first = table.limited.shape[0] - drives.shape[0]
+    evaluate_legs(table, own.state, scratch.search.leg_eval)
+    for i in range(drives.shape[0]):
+        value = deviation(table.limited[first + i], scratch.search.leg_eval.values)
+        ticks = max(ticks, abs(drives[i]["aim"] - value) / (drives[i]["speed"] * dt))
+    return ticks
+
+
+@routine
+def go_straight(own: LivePose, scratch: LiveScratch, dt: float) -> None:
+    """Let drives go straight to a target that legs reach, where the nearest pose of a tick is a long way round."""
+    left = left_of(own, scratch, dt)
+    if ticks_left(own.drives, dt) - left >= DIRECT:
+        return
+    copy_platform_state(own.state, scratch.aside)
+    copy_platform_state(scratch.before, own.state)
+    for i in range(own.drives.shape[0]):
+        own.values[0, own.search.driven[i]["column"]] = own.drives[i]["aim"]
+    if not (search_in_time(own, scratch, WALK) and left_of(own, scratch, dt) < left):
+        copy_platform_state(scratch.before, own.state)
+        go_to_state(own, scratch, scratch.aside)
+
+
+@routine
 def go_on(own: LivePose, scratch: LiveScratch, dt: float) -> None:
     """One tick of dt seconds towards the target, or to rest where that is no pose."""
     tick, drives, is_target, is_known = own.tick[0], own.drives, is_pose(own.targets[0]), False
@@ -320,6 +359,7 @@ def go_on(own: LivePose, scratch: LiveScratch, dt: float) -> None:
         for i in range(drives.shape[0]):
             drives[i]["aim"] = math.nan
             own.values[0, own.search.driven[i]["column"]] = slowed(drives[i], tick["ticks"], dt)
+    copy_platform_state(own.state, scratch.before)
     for attempt in range(ATTEMPTS):
         factor, _ = attempt_of(attempt)
         tick["ticks"] = ticks_to_rest(drives, factor, dt)
@@ -327,6 +367,8 @@ def go_on(own: LivePose, scratch: LiveScratch, dt: float) -> None:
         is_reached = is_known and reach_in_time(own, scratch, dt)
         if is_reached or search_in_time(own, scratch, AIM if is_target and tick["walks"] == 0 else WALK):
             tick["attempt"], tick["searched"] = attempt, 0 if is_reached else 1
+            if is_known and not is_reached and tick["ticks"] == 0.0 and tick["walks"] == 0:
+                go_straight(own, scratch, dt)
             break
     if tick["attempt"] == STILL:
         for j in range(own.step.shape[0]):
@@ -357,5 +399,5 @@ def place_pose(live: int, scratch_address: int) -> None:
     own, scratch = open_live(live), open_scratch(scratch_address)
     for j in range(own.step.shape[0]):
         own.step[j] = 0.0
-    put_where(own, scratch, own.state)
+    place_proximal(own.search, own.state, 0.0, scratch.search.leg_eval)
     put_outputs(own, scratch, 0.0)
