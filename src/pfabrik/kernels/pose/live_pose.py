@@ -197,15 +197,10 @@ def reach_in_time(own: LivePose, scratch: LiveScratch, dt: float) -> bool:
             return False
     copy_table(completion.pose, trial.pose)
     copy_row(scratch.sides, trial.sides)
+    place_proximal(own.search, trial, 0.0, scratch.search.leg_eval)
     q = trial.q
     for k in range(q.shape[0]):
-        leg, own_q = own.search.legs[k], own.state.q[k]
-        if leg["implicit"] == 1:
-            own_q = scratch.sides[k]
-        elif has_proximal(leg):
-            value = completion.values[k, Q_PROXIMAL]
-            own_q = wrap(value, own_q) if leg["proximal"] == CRANK else value
-        q[k] = own_q
+        q[k] = wrap(q[k], own.state.q[k]) if own.search.legs[k]["proximal"] == CRANK else q[k]
     go_to_state(own, scratch, trial)
     return True
 
