@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import replace
 from functools import partial
 from typing import Any, Literal
 
@@ -16,14 +14,13 @@ from .answers.start_configuration import Start, start_of
 from .answers.status import Status
 from .common.arguments import DOUBLE
 from .common.arrays import Floats, read_only
-from .common.checks import require_count, require_positive
+from .common.checks import require_positive
 from .configuration import configuration
-from .engines.engine import Driven, driven_by, engine_of
+from .engines.engine import driven_by, engine_of
 from .engines.kept_assembly import start_or_home
 from .engines.targets import Target, as_targets
 from .errors import InvalidArgument
 from .fk import Actuators, solve_fk
-from .ik import solve_ik
 from .machine.description.drive_limits import drive_limits
 from .machine.description.mechanism import Mechanism, checked_mechanism
 from .machine.motion.displacements import home_coordinates
@@ -51,10 +48,6 @@ class Live:
         also brakes in time for its range.
     hold, hold_price
         As in `Options`.
-    guide : bool or int
-        Whether ticks also look for a nearer pose than the one that they come to by themselves, elsewhere in the
-        workspace or with an arm folded otherwise, and walk there where it is nearer by a tenth: True asks on another
-        thread, a number within the tick, every so many ticks. False for hard real time: nothing is asked.
     start : Solution or array (nq,), optional
         Where the machine is. Default: home.
 
@@ -82,7 +75,6 @@ class Live:
         acceleration: float | Mapping[str, float] | None = None,
         hold: Literal["orientation", "position"] | None = "orientation",
         hold_price: float = 10.0,
-        guide: bool | int = True,
         start: Start | None = None,
     ) -> None:
         self.mechanism = checked_mechanism(mechanism)
@@ -94,7 +86,6 @@ class Live:
             raise InvalidArgument("speed", f"{free[0]} without one", "a most speed of each drive, given or `max_speed`")
         self._driven = driven_by(mechanism, self.options, *self._limits)
         self.pose, self.actuators = read_only(self._driven.pose), read_only(self._driven.actuators)
-        self._guide = Guide(mechanism, self.options, speeds, guide) if guide else None
         self._has_tilt_axis = tilt_axis(mechanism) is not None
         self.status = Status.INVALID
         self.reset(start)
@@ -122,8 +113,6 @@ class Live:
         else:
             self._driven.target[:] = _single(self.mechanism, target)
         self.status = _STATUSES[self._driven.go_on(dt)]
-        if self._guide is not None:
-            self._guide.look(self._driven)
         return self.status
 
     def to(self, actuators: Actuators) -> Status:
@@ -214,68 +203,6 @@ class Live:
         )
         return made, (self.mechanism,)
 
-
-class Guide:
-    """Looks for poses nearer to a target than the one that ticks come to, and lets them walk there.
-
-    Where the way is barred, or the walk does not come nearer in the end, ticks aim at their targets again.
-    """
-
-    def __init__(self, mechanism: Mechanism, options: Options, speeds: Floats, every: bool | int) -> None:
-        self.mechanism, self.options, self.speeds = mechanism, replace(options, working_mode="keep"), speeds
-        self.every = EVERY if every is True else require_count("guide", every)
-        self._pool = ThreadPoolExecutor(1, "pfabrik-guide") if every is True else None
-        self._asked: Future[Solution] | None = None
-        self._ticks, self._goal, self._distance, self._given_up = 0, np.zeros(0), math.inf, math.inf
-
-    def look(self, driven: Driven) -> None:
-        """After a tick: begin a walk to what is nearer, or end one."""
-        self._ticks += 1
-        if driven.tick["status"] == Status.REACHED:
-            self._given_up, self._ticks = math.inf, 0
-            driven.walk_to(None)
-        if driven.tick["walks"]:
-            self._walk(driven)
-        elif self._asked is not None and self._asked.done():
-            self._judge(driven, self._asked.result())
-            self._asked = None
-        if self._asked is None and self._ticks >= self.every and driven.tick["status"] != Status.INVALID:
-            self._ticks, target = 0, driven.target.copy()
-            if self._pool is None:
-                self._judge(driven, self._ask(target))
-            else:
-                self._asked = self._pool.submit(self._ask, target)
-
-    def _ask(self, target: Floats) -> Solution:
-        return solve_ik(self.mechanism, target, options=self.options)
-
-    def _judge(self, driven: Driven, found: Solution) -> None:
-        """Begin a walk to what was found, if that is nearer by a share."""
-        if driven.tick["walks"] or found.status > Status.PROJECTED or not driven.has_mode_of(found._configurations):
-            return
-        distance, lag = driven.distance(found._rows.poses), float(driven.tick["lag"])
-        if distance <= (1.0 - NEARER) * lag - NEARER**3 and distance < self._given_up:
-            self._goal, self._distance = np.array(found.actuators), distance
-            driven.walk_to(self._goal)
-
-    def _walk(self, driven: Driven) -> None:
-        """End a walk that is done, or that goes on no more: then only what is nearer still is walked to."""
-        rates = np.abs(driven.speeds()) / self.speeds
-        if rates.max() < AT_REST:
-            self._given_up = (1.0 - NEARER) * self._distance
-            driven.walk_to(None)
-        elif driven.tick["lag"] <= self._distance:
-            driven.walk_to(None)
-
-
-AT_REST = 1e-3
-"""Share of the most speed below which a walk goes on no more."""
-
-EVERY = 50
-"""Ticks between two questions for a nearer pose."""
-
-NEARER = 0.1
-"""Share of the distance by which a pose is to be nearer, to be walked to."""
 
 _STATUSES = {int(status): status for status in Status}
 

@@ -15,12 +15,12 @@ from .chains.chain_engine import ChainEngine
 from .chains.serial_chain import is_chain
 from .joints.closure_engine import ClosureEngine
 from .joints.configurations import Configurations as Configurations
-from .joints.driven import Driven as Driven
-from .joints.driven import DrivenJoints
+from .joints.driven_joints import DrivenJoints
+from .joints.engine_contract import Driven as Driven
 from .joints.engine_contract import Engine as Engine
 from .joints.engine_contract import Grower as Grower
 from .pose.branch import poses_decide
-from .pose.driven import DrivenLegs
+from .pose.driven_legs import DrivenLegs
 from .pose.legs_engine import LegsApartByJoints, LegsEngine
 from .pose.links_of_legs import keeps_links
 from .pose.seeds import seeds_of_other_assemblies

@@ -30,7 +30,6 @@ TICK = np.dtype(
     [
         ("status", "i8"),  # of the last tick: REACHED, PROJECTED, or INVALID where the target is no pose
         ("attempt", "i8"),  # that found something; STILL if none did
-        ("walks", "i8"),  # 1: to given values of drives, in place of the target
         ("searched", "i8"),  # 1: limits have multipliers
         ("ticks", "f8"),  # as of `ticks_to_rest`, at its begin
         ("to_target", "f8"),  # the same, beside a target that moves as in the tick before
@@ -135,8 +134,8 @@ def is_in_time(drive: Record, value: float) -> bool:
 
 @routine
 def slowed(drive: Record, ticks: float, dt: float) -> float:
-    """Where a drive is after a tick in which all slow down together, to rest in so many; at once in none."""
-    return float(drive["value"] + drive["rate"] * dt * (1.0 - 1.0 / max(ticks, 1.0)))
+    """Where a drive is after a tick in which all slow down together, as hard as they may: see `ticks_to_rest`."""
+    return float(drive["value"] + drive["rate"] * dt * (1.0 - 1.0 / max(ticks - 1.0, 1.0)))
 
 
 @routine

@@ -40,8 +40,8 @@ from .linearise_loops import DescentScratch, begin_pricing, linearise, new_desce
 from .loops import BALL, Loops, Objective, PoseObjective
 from .path_kinematics import LOOPS, State, copy_state, new_state
 
-QUADRATIC_PROGRAMMES = 4
-"""Most steps of a tick: no closed form meets a target exactly, as of legs."""
+QUADRATIC_PROGRAMMES, MORE = 4, 12
+"""Most steps of a tick: no closed form meets a target exactly, as of legs; and where none of them was taken."""
 
 AIM = np.dtype(
     [
@@ -77,7 +77,7 @@ class LiveJoints(NamedTuple):
     scaled: Floats  # (1, 4, 4): in [L], within sight
     free: Floats  # (columns,): no weight on any coordinate
     drives_alone: Floats  # (columns,): weights of drives alone
-    anchors: Floats  # (1, columns): where drives that walk or slow down are to be
+    anchors: Floats  # (1, columns): where drives that slow down are to be
     actuators: Floats  # (n_a,) [length or rad]
     pose: Floats  # (4, 4) [length]
 
@@ -186,22 +186,28 @@ def come_nearer(own: LiveJoints, scratch: DescentScratch) -> None:
 
 
 @routine
-def search_in_time(own: LiveJoints, scratch: DescentScratch, aims: bool) -> bool:
-    """Go to the nearest configuration that loops, limits and links leave, and drives get to in this tick, from here."""
-    aim, weights, kinds = own.aim[0], own.weights if aims else own.nothing, own.free if aims else own.drives_alone
+def objective_of(own: LiveJoints, aims: bool, steps: int) -> Objective:
+    """The objective of a tick: of the target, or of drives that slow down."""
+    aim = own.aim[0]
+    price = aim["price"] if aims else 0.0
+    weights, kinds = own.weights if aims else own.nothing, own.free if aims else own.drives_alone
     pose = PoseObjective(
         own.scaled,
         weights,
         aim["frame"],
         aim["hold"],
-        aim["price"] if aims else 0.0,
+        price,
         aim["rounding"],
         aim["margin"],
         aim["near"],
-        QUADRATIC_PROGRAMMES,
+        steps,
     )
-    objective = Objective(pose, kinds, own.anchors)
-    put_margins(own, scratch, objective)
+    return Objective(pose, kinds, own.anchors)
+
+
+@routine
+def descend_from_here(own: LiveJoints, scratch: DescentScratch, objective: Objective) -> bool:
+    """Descend from where the machine is; False if it is not feasible within the ranges of this tick."""
     copy_state(own.state, scratch.best)
     begin_pricing(scratch.gradient)
     scratch.gradient.unit[0] = 1.0
@@ -211,10 +217,32 @@ def search_in_time(own: LiveJoints, scratch: DescentScratch, aims: bool) -> bool
     if scratch.first.linear.totals[0]["value"] > 0.0:
         descend(own.loops, 0, objective, scratch)
         linearise(own.loops, 0, objective, scratch.best, scratch, scratch.first)
-    if not is_closed(scratch.first.linear, NEARLY_CLOSED):
-        return False
-    go_to_state(own, scratch.best)
-    return True
+    return is_closed(scratch.first.linear, NEARLY_CLOSED)
+
+
+@routine
+def has_moved(own: LiveJoints, state: State) -> bool:
+    """True if some drive has."""
+    for i in range(own.columns.shape[0]):
+        if abs(state.q[own.columns[i]] - own.state.q[own.columns[i]]) > NEARLY_CLOSED:
+            return True
+    return False
+
+
+@routine
+def search_in_time(own: LiveJoints, scratch: DescentScratch, aims: bool) -> bool:
+    """Go to the nearest configuration that loops, limits and links leave, and drives get to in this tick, from here."""
+    objective = objective_of(own, aims, QUADRATIC_PROGRAMMES)
+    put_margins(own, scratch, objective)
+    scratch.control[0]["is_warm"], multipliers = 1, scratch.hessian.multipliers
+    for i in range(own.columns.shape[0]):
+        multipliers[2 * own.columns[i]] = multipliers[2 * own.columns[i] + 1] = 0.0
+    is_found = descend_from_here(own, scratch, objective)
+    if is_found and scratch.control[0]["is_rejected"] == 1 and not has_moved(own, scratch.best):
+        is_found = descend_from_here(own, scratch, objective_of(own, aims, MORE))
+    if is_found:
+        go_to_state(own, scratch.best)
+    return is_found
 
 
 @routine
@@ -261,7 +289,7 @@ def go_on(own: LiveJoints, scratch: DescentScratch, dt: float) -> None:
         factor, _ = attempt_of(attempt)
         tick["ticks"] = ticks_to_rest(own.drives, factor, dt)
         put_ranges(own, attempt, dt)
-        if search_in_time(own, scratch, is_target and tick["walks"] == 0):
+        if search_in_time(own, scratch, is_target):
             tick["attempt"], tick["searched"] = attempt, 1
             break
     if tick["attempt"] == STILL:

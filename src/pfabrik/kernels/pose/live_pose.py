@@ -42,6 +42,7 @@ from ..legs.rods import solve_proximal
 from ..projecting import UNBOUNDED, begin_effort, priced_distance
 from ..quaternions import difference
 from ..rows import INVALID, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
+from ..search_constants import NEARLY_CLOSED, SAME_DISTANCE
 from ..vectors import copy_row, copy_table, scale, vec, wrap
 from ..vectors import move as moved_by
 from .descend_pose import descend
@@ -54,11 +55,11 @@ from .search import SearchScratch, copy_platform_state, fix_held, move, new_sear
 from .search_records import MultistartPlan, PlatformObjective
 from .starts import load_target, place_proximal, put_sides
 
-AIM, WALK = 0, 1
-"""The objectives of a live machine's plan: of the pose, and of drives that walk to values, or slow down."""
+AIM, VALUES = 0, 1
+"""The objectives of a live machine's plan: of the pose, and of values of drives."""
 
-QUADRATIC_PROGRAMMES = 2
-"""Most steps of a tick."""
+QUADRATIC_PROGRAMMES, MORE = 2, 12
+"""Most steps of a search; and where none of them was taken, for limits bend away from it: shorter ones follow."""
 
 
 DIRECT = 0.9
@@ -70,13 +71,13 @@ class LivePose(NamedTuple):
 
     near: Table  # completes what the task leaves open near its start
     search: Table  # its last limits are the drives', whose ranges are a tick's
-    plan: MultistartPlan  # objectives AIM and WALK
+    plan: MultistartPlan  # objectives AIM and VALUES
     drives: Records  # (n_a,): DRIVE, in the order of `driven`
     tick: Records  # (1,): TICK
     state: PlatformState  # where the machine is
     step: Floats  # (unknowns,): from where it was a tick before
     begin: Floats  # (4, 4): its pose [length]
-    values: Floats  # (1, n_a): where drives that walk or slow down are to be [L or rad]
+    values: Floats  # (1, n_a): where drives that go straight or slow down are to be [L or rad]
     targets: Floats  # (1, 4, 4): that of this tick [length]
     actuators: Floats  # (n_a,) [length or rad]
     pose: Floats  # (4, 4) [length]
@@ -92,6 +93,7 @@ class LiveScratch(NamedTuple):
     sides: Floats  # (legs,)
     before: PlatformState  # where a tick began
     aside: PlatformState  # where it might end
+    end: PlatformState  # where the nearest of its searches ends
     no_values: Floats  # (0, n_a)
 
 
@@ -104,6 +106,7 @@ def new_live_scratch(live: LivePose) -> LiveScratch:
         np.zeros(5),
         np.zeros(n),
         np.zeros(legs),
+        new_platform_state(legs),
         new_platform_state(legs),
         new_platform_state(legs),
         np.zeros((0, n)),
@@ -138,9 +141,12 @@ def put_ranges(own: LivePose, attempt: int, dt: float) -> None:
 
 
 @routine
-def bend(own: LivePose, state: PlatformState, leg_eval: LegEvaluation) -> None:
-    """Displace drives at dead points a little to their sides, as far as they go: see `starts.place_proximal`."""
-    table, q, sides, drives = own.search, state.q, state.sides, own.drives
+def bend(own: LivePose, state: PlatformState, leg_eval: LegEvaluation) -> bool:
+    """Displace drives at dead points a little to their sides, as far as they go; True if there are any.
+
+    See `starts.place_proximal`.
+    """
+    table, q, sides, drives, is_bent = own.search, state.q, state.sides, own.drives, False
     first = table.limited.shape[0] - drives.shape[0]
     set_frames(state.pose, table.task[0], leg_eval.frames)
     for k in range(q.shape[0]):
@@ -156,6 +162,8 @@ def bend(own: LivePose, state: PlatformState, leg_eval: LegEvaluation) -> None:
                     if table.limited[first + i]["leg"] == k:
                         room = min(room, 0.5 * (drives[i]["most"] - drives[i]["least"]))
                 q[k] += room * sides[k]
+                is_bent = True
+    return is_bent
 
 
 @routine
@@ -251,31 +259,55 @@ def come_nearer(own: LivePose, search: SearchScratch) -> None:
 
 
 @routine
+def is_same(one: PlatformState, other: PlatformState) -> bool:
+    """True if two configurations have one pose, but for rounding."""
+    for i in range(3):
+        for j in range(4):
+            if abs(one.pose[i, j] - other.pose[i, j]) > NEARLY_CLOSED:
+                return False
+    return True
+
+
+@routine
 def search_in_time(own: LivePose, scratch: LiveScratch, aim: int) -> bool:
     """Go to the nearest pose that limits, links and dead points leave, and drives get to in this tick, from here."""
     search, table, plan = scratch.search, own.search, own.plan
     setting, kept_sides = plan.settings[aim], search.kept_sides
     pose = pose_objective(plan, aim, own.targets, QUADRATIC_PROGRAMMES)
-    objective = PlatformObjective(pose, own.values if aim == WALK else scratch.no_values, setting["implied"])
+    more = pose_objective(plan, aim, own.targets, MORE)
+    values = own.values if aim == VALUES else scratch.no_values
+    objective = PlatformObjective(pose, values, setting["implied"])
     if not load_target(table, pose, 0, search):
         return False
     search.n_cones[0] = table.cones.shape[0]
     search.links.kept[0] = search.links.pairs.shape[0]
     for k in range(kept_sides.shape[0]):
         kept_sides[k] = own.state.sides[k] if has_proximal(table.legs[k]) else 0.0
-    copy_platform_state(own.state, search.best)
-    bend(own, search.best, search.leg_eval)
     fix_held(pose, True, search)
     begin_effort(UNBOUNDED, UNBOUNDED, search.effort[0])
+    search.control[0]["is_warm"], end = 1, 2 * table.limited.shape[0]
+    for number in range(end - 2 * own.drives.shape[0], end):
+        search.hessian.multipliers[number] = 0.0
     if aim == AIM:
         come_nearer(own, search)
     put_margins(own, scratch, objective)
-    if descend(table, 0, objective, math.inf, own.state, search) == math.inf:
+    distance = math.inf
+    for bends in range(2):
+        copy_platform_state(own.state, search.best)
+        if bends == 1 and not bend(own, search.best, search.leg_eval):
+            break
+        found = descend(table, 0, objective, math.inf, own.state, search)
+        if search.control[0]["is_rejected"] == 1 and is_same(own.state, search.best):
+            copy_platform_state(own.state, search.best)
+            found = descend(table, 0, PlatformObjective(more, values, setting["implied"]), math.inf, own.state, search)
+        if found < (1.0 - SAME_DISTANCE) * distance:
+            put_sides(table, search.best, search.leg_eval)
+            if not is_other_mode(table.legs, own.state.sides, search.best.sides):
+                distance = found
+                copy_platform_state(search.best, scratch.end)
+    if distance == math.inf:
         return False
-    put_sides(table, search.best, search.leg_eval)
-    if is_other_mode(table.legs, own.state.sides, search.best.sides):
-        return False
-    go_to_state(own, scratch, search.best)
+    go_to_state(own, scratch, scratch.end)
     return True
 
 
@@ -336,7 +368,7 @@ def go_straight(own: LivePose, scratch: LiveScratch, dt: float) -> None:
     copy_platform_state(scratch.before, own.state)
     for i in range(own.drives.shape[0]):
         own.values[0, own.search.driven[i]["column"]] = own.drives[i]["aim"]
-    if not (search_in_time(own, scratch, WALK) and left_of(own, scratch, dt) < left):
+    if not (search_in_time(own, scratch, VALUES) and left_of(own, scratch, dt) < left):
         copy_platform_state(scratch.before, own.state)
         go_to_state(own, scratch, scratch.aside)
 
@@ -360,9 +392,9 @@ def go_on(own: LivePose, scratch: LiveScratch, dt: float) -> None:
         tick["ticks"] = ticks_to_rest(drives, factor, dt)
         put_ranges(own, attempt, dt)
         is_reached = is_known and reach_in_time(own, scratch, dt)
-        if is_reached or search_in_time(own, scratch, AIM if is_target and tick["walks"] == 0 else WALK):
+        if is_reached or search_in_time(own, scratch, AIM if is_target else VALUES):
             tick["attempt"], tick["searched"] = attempt, 0 if is_reached else 1
-            if is_known and not is_reached and tick["ticks"] == 0.0 and tick["walks"] == 0:
+            if is_known and not is_reached and tick["ticks"] == 0.0:
                 go_straight(own, scratch, dt)
             break
     if tick["attempt"] == STILL:

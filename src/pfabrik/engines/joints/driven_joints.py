@@ -1,17 +1,15 @@
-"""A machine driven along a stream, tick by tick: what engines promise, and that by joint coordinates."""
+"""A machine driven along a stream, tick by tick, in joint coordinates."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-
 import numpy as np
 
-from ...common.arrays import Floats, Record, Records
+from ...common.arrays import Floats, Record
 from ...kernels.drives import DRIVE, TICK
 from ...kernels.handle import Handle
 from ...kernels.joints import live_joints as K
 from ...kernels.joints.linearise_loops import new_descent_scratch
-from ...kernels.joints.loops import Closed
+from ...kernels.joints.loops import Closed, Objective, PoseObjective
 from ...kernels.joints.path_kinematics import load_row, new_state, store_row
 from ...kernels.legs.records import TASK
 from ...machine.description.home_mobility import column_joints
@@ -20,63 +18,9 @@ from ...machine.motion.singularities import are_opposite, assembly_signs, loop_b
 from ...options import Options
 from ...tolerances import TOLERANCES
 from .configurations import Configurations
+from .engine_contract import Driven
 from .link_distances import pair_names
 from .placed_links import links_on_paths
-from .projection import modes_of
-
-
-class Driven(ABC):
-    """A machine that a stream of targets drives, where it is, and the limits that hold it.
-
-    Attributes
-    ----------
-    target : array (4, 4), to be written before a tick [length].
-    pose, actuators : arrays (4, 4) and (n_a,), where it is [length or rad].
-    tick : the record `TICK` of the last tick.
-    drives : the records `DRIVE` of its drives, in the order of `actuators`.
-    """
-
-    target: Floats
-    pose: Floats
-    actuators: Floats
-    tick: Record
-    drives: Records
-
-    def __init__(self, model: Model, options: Options) -> None:
-        self._model, self._mode = model, modes_of(model.closure, options)[-1]
-
-    def distance(self, poses: Floats) -> float:
-        """Distance of a pose (1, 4, 4) from the target, with the price of what is held [L]."""
-        errors = self._model.task.errors(poses, self.target[None])
-        return float(self._mode.distances(self._model.closure, *errors)[0])
-
-    @abstractmethod
-    def has_mode_of(self, configurations: Configurations) -> bool:
-        """True if a configuration, one, is on the same sides of all dead points that are known."""
-
-    @abstractmethod
-    def go_on(self, dt: float) -> int:
-        """One tick of dt seconds; its status."""
-
-    @abstractmethod
-    def walk_to(self, actuators: Floats | None) -> None:
-        """Let ticks go to values of drives (n_a,), not to their targets; None to end that."""
-
-    @abstractmethod
-    def speeds(self) -> Floats:
-        """How fast the drives went in the last tick (n_a,) [length or rad, per s]."""
-
-    @abstractmethod
-    def place(self, configurations: Configurations) -> None:
-        """Let it rest where a configuration, one, has it; the rates of its drives are none."""
-
-    @abstractmethod
-    def coordinates(self) -> Floats:
-        """All joint coordinates, deviations from home (1, columns) [length or rad]."""
-
-    @abstractmethod
-    def multipliers(self) -> dict[tuple[str, str], float]:
-        """Multipliers of the limits in the last search of a tick, by joint and bound; `speed` of drives."""
 
 
 class DrivenJoints(Driven):
@@ -161,23 +105,9 @@ class DrivenJoints(Driven):
         live.drives["speed"] = speeds
         return status
 
-    def walk_to(self, actuators: Floats | None) -> None:
-        """As of `Driven`."""
-        live = self._live
-        self.tick["walks"] = 0 if actuators is None else 1
-        if actuators is not None:
-            live.anchors[0, live.columns] = (actuators - live.homes) / live.units
-
     def speeds(self) -> Floats:
         """As of `Driven`."""
         return np.asarray(self.drives["rate"] * self._live.units)
-
-    def has_mode_of(self, configurations: Configurations) -> bool:
-        """As of `Driven`."""
-        signs = (
-            assembly_signs(self._model.mechanism, configurations.coordinates) if self._has_signs else np.zeros((1, 0))
-        )
-        return not are_opposite(signs, self._signs).any()
 
     def place(self, configurations: Configurations) -> None:
         """As of `Driven`."""
@@ -200,7 +130,7 @@ class DrivenJoints(Driven):
 
     def multipliers(self) -> dict[tuple[str, str], float]:
         """As of `Driven`."""
-        values, mechanism = self._scratch.record.hessian.multipliers, self._model.mechanism
+        values, mechanism = self._weighed(), self._model.mechanism
         joints, n, found = column_joints(mechanism), len(self._live.free), dict[tuple[str, str], float]()
         is_drive = {column: drive for drive, column in enumerate(self._live.columns)}
         cones = [joint.name for joint in mechanism.joints if joint.cone is not None]
@@ -217,6 +147,26 @@ class DrivenJoints(Driven):
                 name = pairs[number - 2 * n - len(cones)], "near"
             found[name] = float(values[number])
         return found
+
+    def _weighed(self) -> Floats:
+        """The multipliers of all limits where the machine is, with the ranges of the last tick."""
+        from ...kernels.joints.descend import nearest_configuration
+
+        live, aim = self._live, self._live.aim[0]
+        targets, loops = live.targets.copy(), Handle(live.loops)
+        targets[:, :3, 3] /= self._model.length
+        priced, near = (aim["hold"], aim["price"], aim["rounding"]), (aim["margin"], aim["near"])
+        pose = PoseObjective(targets, live.weights, int(aim["frame"]), *priced, *near, 0)
+        closed = self._closed(self.coordinates() * self._model.closure.scale)
+        groups = len(live.loops.groups) - 1
+        closed = closed._replace(
+            gaps=np.zeros((1, groups)), excesses=np.zeros((1, groups)), misses=np.zeros((1, groups))
+        )
+        weights = np.zeros((1, len(self._scratch.record.hessian.multipliers)))
+        self._scratch.record.margins[:] = 0.0
+        objective = Objective(pose, live.free, np.zeros((1, 0)))
+        nearest_configuration(loops.address, self._scratch.address, objective, closed, weights)
+        return np.asarray(weights[0])
 
 
 def held_by(drive: Record, bound: str) -> str:

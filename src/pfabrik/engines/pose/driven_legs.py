@@ -9,13 +9,15 @@ from ...kernels.drives import DRIVE, TICK
 from ...kernels.handle import Handle
 from ...kernels.pose import live_pose as K
 from ...kernels.pose.equations import count_unknowns, new_platform_state
+from ...kernels.pose.search_records import Starts, new_solutions
 from ...kernels.rows import PROJECTED
 from ...kernels.search_constants import MOST_STEPS
 from ...machine.model import Model
 from ...options import Options
 from ...tolerances import TOLERANCES
 from ..joints.configurations import Configurations, new_rows
-from ..joints.driven import Driven, held_by
+from ..joints.driven_joints import held_by
+from ..joints.engine_contract import Driven
 from ..joints.link_distances import pair_names
 from .answers import leg_answers, sides_at
 from .nearest import OF_VALUES, objective_of
@@ -63,24 +65,11 @@ class DrivenLegs(Driven):
         """As of `Driven`."""
         return K.tick_pose(*self._address, dt)
 
-    def walk_to(self, actuators: Floats | None) -> None:
-        """As of `Driven`."""
-        driven, values = self._live.search.driven, self._live.values[0]
-        self.tick["walks"] = 0 if actuators is None else 1
-        if actuators is not None:
-            columns = driven["column"]
-            values[columns] = (actuators[columns] - driven["home"]) / driven["unit"]
-
     def speeds(self) -> Floats:
         """As of `Driven`."""
         driven, speeds = self._live.search.driven, np.zeros(len(self.drives))
         speeds[driven["column"]] = self.drives["rate"] * driven["unit"]
         return speeds
-
-    def has_mode_of(self, configurations: Configurations) -> bool:
-        """As of `Driven`."""
-        is_own = self._live.search.legs["has_proximal"] == 1
-        return bool((sides_at(self._model, configurations)[0] * self._live.state.sides >= 0.0)[is_own].all())
 
     def place(self, configurations: Configurations) -> None:
         """As of `Driven`."""
@@ -102,7 +91,7 @@ class DrivenLegs(Driven):
 
     def multipliers(self) -> dict[tuple[str, str], float]:
         """As of `Driven`."""
-        values, own, drives = self._scratch.record.search.hessian.multipliers, self._live.search, self.drives
+        values, own, drives = self._weighed(), self._live.search, self.drives
         names = self._model.legs.limits
         ranges, cones, found = len(own.limited) - len(drives), len(own.cones), dict[tuple[str, str], float]()
         ends = 2 * len(own.limited), 2 * len(own.limited) + cones, 2 * len(own.limited) + cones + len(own.legs)
@@ -127,3 +116,18 @@ class DrivenLegs(Driven):
                 name = pair_names(self._model.mechanism)[number - ends[2]], "near"
             found[name] = max(found.get(name, 0.0), float(values[number]))
         return found
+
+    def _weighed(self) -> Floats:
+        """The multipliers of all limits where the machine is, with the ranges of the last tick."""
+        from ...kernels.pose.nearest import nearest_pose, new_nearest_scratch
+
+        live, none = self._live, np.zeros((0, len(self.drives)))
+        settings = live.plan.settings.copy()
+        settings["steps"] = 0
+        legs, plan = Handle(live.search), Handle(live.plan._replace(settings=settings))
+        scratch, n = Handle(new_nearest_scratch(live.search, plan.record, True)), len(live.search.legs)
+        start = Starts(live.state.pose[None].copy(), live.state.q[None].copy(), live.state.sides[None].copy())
+        weights = np.zeros((1, len(scratch.record.search.hessian.multipliers)))
+        found = new_solutions(1, n, len(self.drives))
+        nearest_pose(legs.address, plan.address, scratch.address, live.targets, none, start, found, weights)
+        return np.asarray(weights[0])
