@@ -8,24 +8,33 @@ from functools import partial
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from .answers.answer_fields import PoseRequest
+from .answers.pace import pace_of
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .answers.status import Status
+from .answers.tracked import Track
 from .common.arguments import DOUBLE
 from .common.arrays import Floats, read_only
 from .common.checks import require_positive
 from .configuration import configuration
-from .engines.engine import driven_by, engine_of
+from .engines.engine import POSITION_ERROR, Configurations, driven_by, engine_of
+from .engines.joints.configurations import new_rows
 from .engines.kept_assembly import start_or_home
 from .engines.targets import Target, as_targets
 from .errors import InvalidArgument
 from .fk import Actuators, solve_fk
+from .kernels.rows import ROTATION_ERROR
 from .machine.description.drive_limits import drive_limits
 from .machine.description.mechanism import Mechanism, checked_mechanism
+from .machine.description.task import task_of
+from .machine.model import model_of
 from .machine.motion.displacements import home_coordinates
 from .machine.motion.fitting_task import tilt_axis
 from .options import Options
+from .track import as_path
 
 
 class Live:
@@ -46,8 +55,10 @@ class Live:
         Highest values of the drives, by name or the same for all [length or rad, per s and per s²]; those not named
         have the `max_speed` and `max_acceleration` of their joints. Every drive needs a speed. With an acceleration it
         also brakes in time for its range.
-    hold, hold_price
-        As in `Options`.
+    hold : {"orientation", "position"} or None
+        What is held out of reach, as in `Options`.
+    hold_price : float
+        Up to which, as in `Options`.
     start : Solution or array (nq,), optional
         Where the machine is. Default: home.
 
@@ -114,6 +125,45 @@ class Live:
             self._driven.target[:] = _single(self.mechanism, target)
         self.status = _STATUSES[self._driven.go_on(dt)]
         return self.status
+
+    def follow(self, targets: Target, *, times: ArrayLike | None = None, sample_time: float | None = None) -> Track:
+        """Go on along a recorded stream, a tick a target, the first a tick after now; the answers of the ticks.
+
+        Parameters
+        ----------
+        targets : array or RigidTransform or mapping
+            A path of targets, as in `track`.
+        times : array (n,), optional
+            The time of each target [s]; the first tick takes as long as the second.
+        sample_time : float, optional
+            In place of `times`, the time from one target to the next [s].
+
+        Raises
+        ------
+        InvalidArgument
+            As in `track`; also where the time between two targets is not positive, or not known.
+        """
+        mechanism = self.mechanism
+        poses, engine = as_path(mechanism, targets, self.options), engine_of(mechanism)
+        limits = dict(zip(mechanism.actuator_names, self._limits[0].tolist(), strict=True))
+        pace = pace_of(mechanism, len(poses), sample_time, times, limits)
+        if pace is None:
+            raise InvalidArgument("sample_time", "None", "the time between two targets [s], or times")
+        steps = np.diff(pace.times) if len(poses) > 1 else np.ones(len(poses))
+        if not (steps > 0.0).all():
+            raise InvalidArgument("times", "targets at one time, or at none that is known", "times that grow")
+        rows, ticks = new_rows(model_of(mechanism), len(poses)), np.append(steps[:1], steps)[: len(poses)]
+        coordinates = np.zeros((len(poses), len(mechanism.coordinates)))
+        for k, (pose, dt) in enumerate(zip(poses, ticks.tolist(), strict=True)):
+            rows.status[k] = self.tick(pose, dt)
+            rows.poses[k], rows.actuators[k], coordinates[k] = self.pose, self.actuators, self._driven.coordinates()[0]
+        errors = task_of(mechanism).errors(rows.poses, poses)
+        rows.measures[:, POSITION_ERROR], rows.measures[:, ROTATION_ERROR] = errors
+        track = Track(
+            mechanism, Configurations(rows, coordinates), PoseRequest(poses.copy(), self.options), pace, engine
+        )
+        track.jumps = np.zeros(len(poses), bool)  # drives go from each tick to the next
+        return track
 
     def to(self, actuators: Actuators) -> Status:
         """Go where drives were measured to be (n_a,) [length or rad], in the same assembly; the status of `solve_fk`.

@@ -106,6 +106,27 @@ def share_to_rest(ticks: float) -> float:
 
 
 @routine
+def kept_of_rate(ticks: float) -> float:
+    """The share of its rate that a drive keeps in a tick in which all slow down together: see `ticks_to_rest`."""
+    return 1.0 - 1.0 / max(ticks - 1.0, 1.0)
+
+
+@routine
+def left_of_limit(h: float, bend: float, rate: float, ticks: float) -> float:
+    """How far inside a limit a tick stays, so that drives can rest before it [L or rad].
+
+    A tick goes a share of what is left, or as far as it goes slowing down, which is safe if the ticks before were.
+
+    Parameters
+    ----------
+    h, bend : its excess, and by how much more the way to rest comes to than its slope says.
+    rate : its change by the last step.
+    """
+    goes = max(share_to_rest(ticks) * (-h - max(bend, 0.0)), rate * kept_of_rate(ticks))
+    return max(-h - goes, 0.0)
+
+
+@routine
 def put_bounds(drive: Record, attempt: int, ticks: float, dt: float) -> None:
     """Fill where a drive may go in an attempt at a tick of dt seconds; what it cannot keep, its range comes first.
 
@@ -121,7 +142,8 @@ def put_bounds(drive: Record, attempt: int, ticks: float, dt: float) -> None:
         slowest = fastest = drive["rate"] - math.copysign(change, drive["rate"])
     spare = min(2.0 * CLOSED, 0.5 * (fastest - slowest) * dt)
     least, most = share * (slowest * dt + spare), share * (fastest * dt - spare)
-    lo, hi = room * (drive["lo"] - value), room * (drive["hi"] - value)
+    slowed_down = drive["rate"] * dt * kept_of_rate(ticks)
+    lo, hi = min(room * (drive["lo"] - value), slowed_down), max(room * (drive["hi"] - value), slowed_down)
     drive["least"] = max(min(max(least, lo), most), drive["lo"] - value) + value
     drive["most"] = min(max(min(most, hi), least), drive["hi"] - value) + value
 
@@ -135,7 +157,7 @@ def is_in_time(drive: Record, value: float) -> bool:
 @routine
 def slowed(drive: Record, ticks: float, dt: float) -> float:
     """Where a drive is after a tick in which all slow down together, as hard as they may: see `ticks_to_rest`."""
-    return float(drive["value"] + drive["rate"] * dt * (1.0 - 1.0 / max(ticks - 1.0, 1.0)))
+    return float(drive["value"] + drive["rate"] * dt * kept_of_rate(ticks))
 
 
 @routine

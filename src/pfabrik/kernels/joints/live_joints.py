@@ -19,6 +19,8 @@ from ..drives import (
     TICK,
     attempt_of,
     go_to,
+    kept_of_rate,
+    left_of_limit,
     put_bounds,
     rest_at,
     share_to_rest,
@@ -132,7 +134,7 @@ def load_scaled(own: LiveJoints) -> None:
 def put_margins(own: LiveJoints, scratch: DescentScratch, objective: Objective) -> None:
     """As of `pose.live_pose`."""
     loops, columns, ticks, margins = own.loops, own.columns, own.tick[0]["ticks"], scratch.margins
-    here, there, share = scratch.first, scratch.second, share_to_rest(ticks)
+    here, there = scratch.first, scratch.second
     for c in range(margins.shape[0]):
         margins[c] = 0.0
     if ticks == 0.0:
@@ -143,11 +145,11 @@ def put_margins(own: LiveJoints, scratch: DescentScratch, objective: Objective) 
     move(loops, own.step, 0.5 * ticks, scratch.trial)
     linearise(loops, 0, objective, scratch.trial, scratch, there)
     for c in range(here.linear.totals[0]["limits"]):
-        number, h, bend = here.linear.which[c], here.linear.h[c], 0.0
+        number, h, bend, rate = here.linear.which[c], here.linear.h[c], 0.0, along_step(here, c, own.step)
         for d in range(there.linear.totals[0]["limits"]):
             if there.linear.which[d] == number:
-                bend = there.linear.h[d] - h - 0.5 * ticks * along_step(here, c, own.step)
-        margins[number] = max((share - 1.0) * h + share * max(bend, 0.0), 0.0)
+                bend = there.linear.h[d] - h - 0.5 * ticks * rate
+        margins[number] = left_of_limit(h, bend, rate, ticks)
     for i in range(columns.shape[0]):
         margins[2 * columns[i]] = margins[2 * columns[i] + 1] = 0.0
 
@@ -209,6 +211,8 @@ def objective_of(own: LiveJoints, aims: bool, steps: int) -> Objective:
 def descend_from_here(own: LiveJoints, scratch: DescentScratch, objective: Objective) -> bool:
     """Descend from where the machine is; False if it is not feasible within the ranges of this tick."""
     copy_state(own.state, scratch.best)
+    if own.tick[0]["ticks"] > 0.0:  # where drives slow down together, which they can
+        move(own.loops, own.step, kept_of_rate(own.tick[0]["ticks"]), scratch.best)
     begin_pricing(scratch.gradient)
     scratch.gradient.unit[0] = 1.0
     linearise(own.loops, 0, objective, scratch.best, scratch, scratch.first)

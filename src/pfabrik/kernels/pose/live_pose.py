@@ -24,6 +24,8 @@ from ..drives import (
     go_to,
     is_in_time,
     keeps_up,
+    kept_of_rate,
+    left_of_limit,
     put_bounds,
     rest_at,
     share_to_rest,
@@ -46,7 +48,7 @@ from ..search_constants import NEARLY_CLOSED, SAME_DISTANCE
 from ..vectors import copy_row, copy_table, scale, vec, wrap
 from ..vectors import move as moved_by
 from .descend_pose import descend
-from .equations import LegEvaluation, PlatformState, evaluate_legs, has_proximal, new_platform_state
+from .equations import LegEvaluation, PlatformState, close_rods, evaluate_legs, has_proximal, new_platform_state
 from .limits import place_links
 from .linearise import linearise
 from .nearest import PLAN, is_other_mode, pose_objective, turned_by
@@ -62,7 +64,7 @@ QUADRATIC_PROGRAMMES, MORE = 2, 12
 """Most steps of a search; and where none of them was taken, for limits bend away from it: shorter ones follow."""
 
 
-DIRECT = 0.9
+DIRECT = 0.84
 """Least share of a tick at full speed by which drives are to come nearer in it to a target that legs reach."""
 
 
@@ -222,7 +224,7 @@ def put_margins(own: LivePose, scratch: LiveScratch, objective: PlatformObjectiv
     """
     search, table, ticks = scratch.search, own.search, own.tick[0]["ticks"]
     margins, here, there, n_drives = search.margins, search.first, search.second, own.drives.shape[0]
-    share, end = share_to_rest(ticks), 2 * table.limited.shape[0]
+    end = 2 * table.limited.shape[0]
     for c in range(margins.shape[0]):
         margins[c] = 0.0
     if ticks == 0.0:
@@ -232,11 +234,11 @@ def put_margins(own: LivePose, scratch: LiveScratch, objective: PlatformObjectiv
     move(table, own.step, 0.5 * ticks, search.trial)
     linearise(table, 0, objective, search.trial, search, there)
     for c in range(here.linear.totals[0]["limits"]):
-        number, h, bend = here.linear.which[c], here.linear.h[c], 0.0
+        number, h, bend, rate = here.linear.which[c], here.linear.h[c], 0.0, along_step(here, c, own.step)
         for d in range(there.linear.totals[0]["limits"]):
             if there.linear.which[d] == number:
-                bend = there.linear.h[d] - h - 0.5 * ticks * along_step(here, c, own.step)
-        margins[number] = max((share - 1.0) * h + share * max(bend, 0.0), 0.0)
+                bend = there.linear.h[d] - h - 0.5 * ticks * rate
+        margins[number] = left_of_limit(h, bend, rate, ticks)
     for number in range(end - 2 * n_drives, end):
         margins[number] = 0.0
 
@@ -294,6 +296,9 @@ def search_in_time(own: LivePose, scratch: LiveScratch, aim: int) -> bool:
     distance = math.inf
     for bends in range(2):
         copy_platform_state(own.state, search.best)
+        if own.tick[0]["ticks"] > 0.0:  # where drives slow down together, which they can
+            move(table, own.step, kept_of_rate(own.tick[0]["ticks"]), search.best)
+            close_rods(table, search.best, search.leg_eval)
         if bends == 1 and not bend(own, search.best, search.leg_eval):
             break
         found = descend(table, 0, objective, math.inf, own.state, search)
