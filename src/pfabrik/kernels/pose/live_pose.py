@@ -44,7 +44,7 @@ from ..legs.rods import solve_proximal
 from ..projecting import UNBOUNDED, begin_effort, priced_distance
 from ..quaternions import difference
 from ..rows import INVALID, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
-from ..search_constants import NEARLY_CLOSED, SAME_DISTANCE
+from ..search_constants import NEARLY_CLOSED, REACH, SAME_DISTANCE
 from ..vectors import copy_row, copy_table, scale, vec, wrap
 from ..vectors import move as moved_by
 from .descend_pose import descend
@@ -229,6 +229,7 @@ def put_margins(own: LivePose, scratch: LiveScratch, objective: PlatformObjectiv
         margins[c] = 0.0
     if ticks == 0.0:
         return
+    search.near[0] = REACH
     linearise(table, 0, objective, own.state, search, here)
     copy_platform_state(own.state, search.trial)
     move(table, own.step, 0.5 * ticks, search.trial)
