@@ -17,9 +17,9 @@ import pfabrik as pf
 from command import pfabrik
 from machines import closure, planar
 from pfabrik.capabilities.timing.curve import curve_of
-from pfabrik.capabilities.timing.time_path import limits_of
 from pfabrik.common.arrays import Floats
 from pfabrik.errors import InvalidArgument, UnknownName
+from pfabrik.kinematics import drive_limits
 from pfabrik.machine.description.task import task_of
 from pfabrik.machine.motion.displacements import actuator_units
 from pfabrik.machine.motion.loops import first_order
@@ -162,16 +162,16 @@ def test_limits_come_from_the_file_and_from_the_call() -> None:
         pf.Joint("y", "prismatic", ("a", "b"), axis=(0, 1, 0), actuated=True),
     ]
     mechanism = pf.Mechanism("table", joints, "b", (0, 0, 0), task=("x", "y"))
-    assert limits_of(mechanism, "speed", None).tolist() == [3.0, np.inf]
-    assert limits_of(mechanism, "acceleration", {"y": 2.0}).tolist() == [7.0, 2.0]
-    assert limits_of(mechanism, "speed", 5.0).tolist() == [5.0, 5.0]
+    assert drive_limits(mechanism, "speed", None).tolist() == [3.0, np.inf]
+    assert drive_limits(mechanism, "acceleration", {"y": 2.0}).tolist() == [7.0, 2.0]
+    assert drive_limits(mechanism, "speed", 5.0).tolist() == [5.0, 5.0]
     with pytest.raises(UnknownName, match="did you mean"):
-        limits_of(mechanism, "speed", {"yy": 1.0})
+        drive_limits(mechanism, "speed", {"yy": 1.0})
     post = pf.Joint(
         "post", "cylindrical", ("base", "arm"), at=(0, 0, 0), axis=(0, 0, 1), actuated=True, max_speed=(2.0, 30.0)
     )
     column = pf.Mechanism("column", [post], "arm", (1, 0, 0), task=("z", "yaw"))
-    assert limits_of(column, "speed", {"post[0]": 1.0}).tolist() == [1.0, 30.0]
+    assert drive_limits(column, "speed", {"post[0]": 1.0}).tolist() == [1.0, 30.0]
     track = pf.track(column, pf.pose([[1, 0, 0], [0, 1, 20]], rpy=[[0, 0, 0], [0, 0, np.pi / 2]]))
     assert pf.time_path(track).duration == pytest.approx(max(np.pi / 2 / 2.0, 20.0 / 30.0), rel=1e-6)
 

@@ -118,6 +118,7 @@ from .feasibility import Feasibility as Feasibility
 from .feasibility import feasibility as feasibility
 from .fk import solve_fk as solve_fk
 from .ik import solve_ik as solve_ik
+from .live import Live as Live
 from .machine.catalog import catalog as catalog
 from .machine.decomposition.decompose import SubChain as SubChain
 from .machine.decomposition.decompose import decompose as decompose

@@ -5,7 +5,7 @@ from its public module. What it asks of the machine itself it imports from here,
 contracts in `pyproject.toml` name the few that search or prove by the engines' own parts. Each name is documented where
 it is defined.
 
-Machine       model_of, Model; task_of, Task
+Machine       model_of, Model; task_of, Task; drive_limits
 Engine        engine_of, kind_of_engine, Grower, Starts, Configurations, legs_decide, why_not_measured
 Targets       Target, as_targets, carrying_joint; POSITION_ERROR
 Shown as      readouts, readout, Readout; plane_of
@@ -24,6 +24,7 @@ from .engines.joints.first_order import JointRates
 from .engines.targets import Target, as_targets, carrying_joint
 from .engines.varied import LegSlopes, MachineAt, VariedGeometry, VariedMachine, leg_slopes, varied
 from .machine.description.body_inertias import BodyInertia, inertias_of
+from .machine.description.drive_limits import drive_limits
 from .machine.description.graph import tree_of
 from .machine.description.home_mobility import column_joints
 from .machine.description.links import links_of
@@ -74,6 +75,7 @@ __all__ = [
     "cut_loops",
     "cycle_basis",
     "displacements",
+    "drive_limits",
     "end_effector_pose",
     "engine_of",
     "generic_of",

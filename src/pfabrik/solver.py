@@ -13,7 +13,7 @@ from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .answers.status import Status
 from .common.arguments import DOUBLE
-from .common.arrays import Floats
+from .common.arrays import Floats, read_only
 from .engines.engine import engine_of
 from .engines.joints.configurations import new_rows
 from .engines.targets import Target
@@ -88,7 +88,7 @@ class Solver:
         self._prepared_forward = engine.prepared_forward(begin, self._rows)
         self._reach, self._assemble = (call and call[0] for call in (self._prepared, self._prepared_forward))
         self._forward = np.empty((3 if mechanism.end_effector_is_joint else 6, len(mechanism.actuator_names)))
-        self.pose, self.actuators = _read_only(self._rows.poses[0]), _read_only(self._rows.actuators[0])
+        self.pose, self.actuators = read_only(self._rows.poses[0]), read_only(self._rows.actuators[0])
         self.status = Status.INVALID
         self._solution: Solution | None = None
         self._was_forward = False
@@ -143,7 +143,7 @@ class Solver:
             There is no answer.
         """
         self._forward[:] = forward_jacobian(self.solution)
-        return _read_only(self._forward)
+        return read_only(self._forward)
 
     @property
     def solution(self) -> Solution:
@@ -184,13 +184,6 @@ class Solver:
         """Forget the last answer."""
         self._solution, self.status = None, Status.INVALID
         self._rows.poses[:], self._rows.actuators[:] = np.nan, np.nan
-
-
-def _read_only(array: Floats) -> Floats:
-    """A read-only view of an array."""
-    view = array.view()
-    view.setflags(write=False)
-    return view
 
 
 def prepare(mechanism: Mechanism) -> None:

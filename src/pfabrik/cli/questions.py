@@ -209,7 +209,7 @@ def speed_limits(mechanism: pf.Mechanism, words: Sequence[str], option: str = "-
 
 def own_limits(mechanism: pf.Mechanism) -> dict[str, float]:
     """The speeds that the mechanism's file gives, by name [rad/s or length/s]."""
-    from ..capabilities.timing.time_path import limits_of
+    from ..kinematics import drive_limits
 
-    speeds = zip(mechanism.actuator_names, limits_of(mechanism, "speed", None).tolist(), strict=True)
+    speeds = zip(mechanism.actuator_names, drive_limits(mechanism, "speed", None).tolist(), strict=True)
     return {name: speed for name, speed in speeds if math.isfinite(speed)}

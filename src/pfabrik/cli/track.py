@@ -56,6 +56,7 @@ MOST_TARGETS = 1_000_000_000
 @click.option("--longest", type=FINITE, metavar="D", help="Resample the path: longest step [length].")
 @click.option("--tolerance", type=FINITE, metavar="D", help="How far steps may be off an arc [length].")
 @speed_option
+@click.option("--live", "is_live", is_flag=True, help="Follow it as a stream: drives keep --speed, nothing leaps.")
 @click.option(
     "--plot", "picture_path", type=click.Path(path_type=Path), metavar="FILE", help="Picture: PNG, SVG or PDF."
 )
@@ -68,6 +69,7 @@ def track(
     output: Path | None,
     options: pf.Options,
     speeds: tuple[str, ...],
+    is_live: bool,
     picture_path: Path | None,
     film_path: Path | None,
     drawn: PictureOptions,
@@ -85,6 +87,9 @@ def track(
     and angles in the unit they came in.
 
     --plot draws the path, every actuator between its limits, and all margins; --animate the machine on its way.
+
+    --live follows the path as a stream, a tick a target: no drive is faster than it may, every limit is kept, nothing
+    leaps; out of reach, and where the path is too fast, answers lag behind. The path needs times, and drives speeds.
 
     The exit code is 1 also where an actuator would have to be faster than it may.
     """
@@ -109,7 +114,9 @@ def track(
     blocks, n_targets = blocks_of(path if output is not None else STANDARD, read, check, whole=is_whole)
     summary = TrackSummary(mechanism)
     with nullcontext() if output is None else whole_file(output) as handle:
-        solution = follow(mechanism, blocks, options, own_limits(mechanism) | limits, handle, summary, n_targets)
+        every = own_limits(mechanism) | limits
+        live = pf.Live(mechanism, speed=every, hold=options.hold, hold_price=options.hold_price) if is_live else None
+        solution = follow(mechanism, blocks, options, every, handle, summary, n_targets, live)
     draw(solution, picture_path, film_path, drawn)
     if as_json:
         print_json(solution.to_dict())
@@ -193,15 +200,21 @@ def follow(
     handle: TextIO | None,
     summary: TrackSummary,
     n_targets: int | None,
+    live: pf.Live | None,
 ) -> pf.Track:
     """Follow a path part by part, write its rows and sum it up; the answers to the last part."""
-    from ..capabilities.paths.follow import follow_parts
+    from ..capabilities.paths.follow import drive_parts, follow_parts
     from ..capabilities.paths.track_rows import TrackRows
 
     rows = None if handle is None else TrackRows(handle)
     with telling(f"tracking {counted(n_targets, 'target') if n_targets else 'targets'}") as tell:
         on_progress = None if tell is None else lambda done: tell(done, n_targets or 0)
-        parts = follow_parts(mechanism, blocks, options=options, speed_limits=limits or None, on_progress=on_progress)
+        if live is None:
+            parts = follow_parts(
+                mechanism, blocks, options=options, speed_limits=limits or None, on_progress=on_progress
+            )
+        else:
+            parts = drive_parts(live, blocks, on_progress=on_progress)
         for part in parts:
             summary.add(part.track, part.first, part.path.lines)
             if rows is not None:

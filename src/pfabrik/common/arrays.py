@@ -35,3 +35,10 @@ def as_plain(value: Any) -> Any:
     if array.dtype.kind == "f" and not np.isfinite(array).all():
         return np.where(np.isfinite(array), array.astype(object), np.array(None)).tolist()
     return array.tolist()
+
+
+def read_only(array: Floats) -> Floats:
+    """A read-only view of an array."""
+    view = array.view()
+    view.setflags(write=False)
+    return view

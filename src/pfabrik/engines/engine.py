@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from typing import Literal
 
+from ..common.arrays import Floats
 from ..common.derived import derived
 from ..kernels.pose.search_records import Starts as Starts
 from ..kernels.rows import POSITION_ERROR as POSITION_ERROR
 from ..machine.description.mechanism import Mechanism
 from ..machine.model import Model, model_of
+from ..options import Options
 from .chains.chain_engine import ChainEngine
 from .chains.serial_chain import is_chain
 from .joints.closure_engine import ClosureEngine
 from .joints.configurations import Configurations as Configurations
+from .joints.driven_joints import DrivenJoints
+from .joints.engine_contract import Driven as Driven
 from .joints.engine_contract import Engine as Engine
 from .joints.engine_contract import Grower as Grower
 from .pose.branch import poses_decide
+from .pose.driven_legs import DrivenLegs
 from .pose.legs_engine import LegsApartByJoints, LegsEngine
 from .pose.links_of_legs import keeps_links
 from .pose.seeds import seeds_of_other_assemblies
@@ -65,6 +70,14 @@ def _knows_all_modes(model: Model) -> bool:
 def _engine(model: Model) -> Engine:
     at_tip = read_at_tip(model)
     return _completing(model) if at_tip is None else TipEngine(model, _completing(model), LegsEngine(at_tip))
+
+
+def driven_by(mechanism: Mechanism, options: Options, speeds: Floats, accelerations: Floats) -> Driven:
+    """A machine that streams drive, as fast as its drives may [per s, per s^2]."""
+    model = model_of(mechanism)
+    if model.has_legs and keeps_links(model) and LegsEngine(model).searches:
+        return DrivenLegs(model, options, speeds, accelerations)
+    return DrivenJoints(model, options, speeds, accelerations)
 
 
 def _completing(model: Model) -> Engine:

@@ -19,6 +19,7 @@ from .joints.close import close
 from .joints.descend import nearest_configuration
 from .joints.first_order import rates
 from .joints.joint_tables import Answered
+from .joints.live_joints import place_joints, tick_joints
 from .joints.loops import Closed, ClosureProblem, FirstOrder, FirstOrderPlan, Objective, PoseObjective
 from .lattice import join, number_points
 from .legs.answer import answer
@@ -33,6 +34,7 @@ from .pose.answer_rows import answer_rows, mark_near
 from .pose.evaluate import evaluate_poses, jacobians
 from .pose.forward import assemble
 from .pose.forward_blocks import assemble_in_blocks
+from .pose.live_pose import place_pose, tick_pose
 from .pose.nearest import nearest_pose
 from .pose.search_records import PoseSolutions, Starts
 from .pose.tables import Start
@@ -95,6 +97,10 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (signs_of, tuple(_values("F2 f2"))),
     (answer_rows, (*_values("i i i F3"), Start(*_values("F3 F2 F2")), _SOLUTIONS)),
     (nearest_pose, (*_values("i i i F3 F2"), Starts(*_values("F3 F2 F2")), _SOLUTIONS, *_values("f2"))),
+    (tick_joints, tuple(_values("i i f"))),
+    (place_joints, tuple(_values("i i"))),
+    (tick_pose, tuple(_values("i i f"))),
+    (place_pose, tuple(_values("i i"))),
     (assemble, (*_values("i i F2 i b i1 f2"), _ENDS, *_values("f2"))),
     (assemble_in_blocks, (*_values("i I1 F2 i i1 f2"), _ENDS, *_values("f2"))),
     (margins_in_blocks, tuple(_values("i F3 F3 F2 i f1 i1"))),

@@ -173,6 +173,15 @@ def along_shift(gradient: Floats, reduced: FreeMotions) -> float:
 
 
 @routine
+def along_step(reduced: FreeMotions, c: int, step: Floats) -> float:
+    """Change of limit c by a step of the unknowns that meets the equations."""
+    total = 0.0
+    for a in range(reduced.linear.totals[0]["motions"]):
+        total += reduced.linear.G[c, a] * step[reduced.free[a]]
+    return total
+
+
+@routine
 def put_step(x: Floats, reduced: FreeMotions, step: Floats) -> None:
     """Fill a step of the unknowns: one of the free motions plus the one that meets the equations."""
     basis, pivots, free, totals = reduced.basis, reduced.pivots, reduced.free, reduced.linear.totals[0]

@@ -77,6 +77,7 @@ CONTROL = np.dtype(
         ("is_exact", "i8"),  # 1 if its actual reduction was as predicted
         ("is_damped", "i8"),  # 1 if damping made the last step short
         ("is_restoring", "i8"),  # 1 if feasibility is restored after each step
+        ("is_warm", "i8"),  # 1 if a descent goes on from where the last one ended: its multipliers are a good guess
         ("closed", "f8"),  # objective at the last feasible configuration
     ]
 )
@@ -298,8 +299,9 @@ def scale_objective(linear: Linearisation) -> float:
 @routine
 def begin_descent(linear: Linearisation, hessian: Hessian, control: Record) -> None:
     """Initialise the step control at a feasible configuration."""
+    is_warm = control["is_warm"] == 1
     for c in range(len(hessian.multipliers)):
-        hessian.multipliers[c] = 0.0
+        hessian.multipliers[c] = hessian.multipliers[c] if is_warm else 0.0
     control["damping"] = FIRST_DAMPING * longest(linear.g, linear.totals[0]["motions"]) / LONGEST_STEP
     control["predicted"], control["weight"] = math.inf, 0.0
     control["steps"] = control["is_done"] = control["is_rejected"] = control["is_exact"] = 0

@@ -11,6 +11,7 @@ from ...answers.solution import Solution
 from ...answers.status import Status
 from ...answers.tracked import Track
 from ...common.arrays import Ints
+from ...live import Live
 from ...machine.description.mechanism import Mechanism
 from ...options import Options
 from ...track import track
@@ -71,6 +72,23 @@ def follow_parts(
         if place is not None:
             start = answers[place]
         kept = path.after(max(len(path.lines) - 2, 0) if place is None else place)
+
+
+def drive_parts(
+    live: Live, blocks: Iterable[Path], *, on_progress: Callable[[int], None] | None = None
+) -> Iterator[TrackPart]:
+    """The answers of ticks along a path, a part at a time; see `Live.follow`.
+
+    Parameters
+    ----------
+    on_progress : called with the steps done after every part.
+    """
+    done = 0
+    for block in blocks:
+        yield TrackPart(block, live.follow(block.targets, times=block.times), 0)
+        done += len(block.lines)
+        if on_progress is not None:
+            on_progress(done)
 
 
 def _last_feasible(status: Ints) -> int | None:

@@ -15,10 +15,9 @@ from ...answers.status import Status
 from ...common.arrays import Floats
 from ...common.printed import Printed, ResultTable, plain
 from ...errors import InvalidArgument
-from ...kinematics import internal_rates, task_of
+from ...kinematics import drive_limits, internal_rates, task_of
 from ...machine.description.mechanism import Mechanism
 from ...tolerances import TOLERANCES
-from .time_path import limits_of
 
 ROUNDED = 1e-12
 """Shares of limits that differ by no more differ by rounding."""
@@ -116,7 +115,7 @@ def platform_speed(solution: Solution, *, speed: float | Mapping[str, float] | N
         raise InvalidArgument("solution", f"batch shape {solution.shape}", "a single configuration")
     if solution.status == Status.INVALID:
         raise InvalidArgument("solution", "an answer that is INVALID", "one with a configuration")
-    limits = limits_of(mechanism, "speed", speed)
+    limits = drive_limits(mechanism, "speed", speed)
     if not np.isfinite(limits).any():
         raise InvalidArgument(
             "speed", f"'{mechanism.name}' without max_speed", "a limit of speed, given or in the mechanism"

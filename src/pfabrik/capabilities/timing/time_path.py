@@ -10,12 +10,11 @@ from numpy.typing import ArrayLike
 from ...answers.solution import Solution
 from ...answers.tracked import Track, refuse_leaps
 from ...common.arrays import Floats
-from ...common.checks import put_limits, require_positive, require_type
+from ...common.checks import require_positive, require_type
 from ...errors import InvalidArgument
 from ...fk import solve_fk
 from ...kernels.timing import acceleration_shares, fastest, speed_shares
-from ...kinematics import actuator_units, readouts
-from ...machine.description.mechanism import Mechanism
+from ...kinematics import actuator_units, drive_limits, readouts
 from ...tolerances import TOLERANCES
 from ..dynamics.moving_rows import MovingRows
 from ..dynamics.weights import lacking_masses, weights_of
@@ -86,9 +85,9 @@ def time_path(
     """
     require_type("track", track, Track, "a Track, as `track` returns")
     mechanism = track.mechanism
-    speeds = limits_of(mechanism, "speed", speed)
-    accelerations = limits_of(mechanism, "acceleration", acceleration)
-    torques = limits_of(mechanism, "torque", torque)
+    speeds = drive_limits(mechanism, "speed", speed)
+    accelerations = drive_limits(mechanism, "acceleration", acceleration)
+    torques = drive_limits(mechanism, "torque", torque)
     if torque is None and lacking_masses(mechanism):
         torques[:] = np.inf
     most_platform = np.inf if platform_speed is None else require_positive("platform_speed", platform_speed)
@@ -130,13 +129,6 @@ def _torques(
 
     source = TorqueSource(mechanism, rows_at, curve.step_of)
     return TorquePath(limits, source, curve.grid(TORQUE_PLACES, 1))
-
-
-def limits_of(mechanism: Mechanism, what: str, given: float | Mapping[str, float] | None) -> Floats:
-    """The highest speed or acceleration of every actuator, (n_a,); infinite where there is none."""
-    limits = np.array([drive.said(f"max_{what}") or np.inf for drive in mechanism.drives])
-    put_limits(limits, what, given, mechanism.actuator_names)
-    return limits
 
 
 def refuse_swings(track: Track, curve: Curve) -> None:

@@ -6,14 +6,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from typing import Literal, Protocol
 
-from ...common.arrays import Floats
+from ...common.arrays import Floats, Record, Records
 from ...kernels.pose.search_records import Starts
 from ...kernels.rows import Rows
+from ...machine.model import Model
 from ...options import Options
 from .attempts import Attempt
 from .close import Closing
 from .configurations import Configurations
-from .projection import ProjectionMode
+from .projection import ProjectionMode, modes_of
 
 OnProgress = Callable[[int, int], None]
 """Called with the number of targets solved, and of all."""
@@ -136,3 +137,44 @@ class Engine(InverseEngine):
         In the order low and high bound of each coordinate, then the cones: the decrease of the distance [L] per unit
         [L or rad] by which the limit is relaxed; 0 for limits that are not active.
         """
+
+
+class Driven(ABC):
+    """A machine that a stream of targets drives, where it is, and the limits that hold it.
+
+    Attributes
+    ----------
+    target : array (4, 4), to be written before a tick [length].
+    pose, actuators : arrays (4, 4) and (n_a,), where it is [length or rad].
+    tick : the record `TICK` of the last tick.
+    drives : the records `DRIVE` of its drives, in the order of `actuators`.
+    """
+
+    target: Floats
+    pose: Floats
+    actuators: Floats
+    tick: Record
+    drives: Records
+
+    def __init__(self, model: Model, options: Options) -> None:
+        self._model, self._mode = model, modes_of(model.closure, options)[-1]
+
+    @abstractmethod
+    def go_on(self, dt: float) -> int:
+        """One tick of dt seconds; its status."""
+
+    @abstractmethod
+    def speeds(self) -> Floats:
+        """How fast the drives went in the last tick (n_a,) [length or rad, per s]."""
+
+    @abstractmethod
+    def place(self, configurations: Configurations) -> None:
+        """Let it rest where a configuration, one, has it; the rates of its drives are none."""
+
+    @abstractmethod
+    def coordinates(self) -> Floats:
+        """All joint coordinates, deviations from home (1, columns) [length or rad]."""
+
+    @abstractmethod
+    def multipliers(self) -> dict[tuple[str, str], float]:
+        """Multipliers of the limits in the last search of a tick, by joint and bound; `speed` of drives."""

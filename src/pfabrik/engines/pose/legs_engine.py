@@ -72,14 +72,14 @@ class LegsEngine(Engine):
     def __init__(self, model: Model) -> None:
         self.model, self._table = model, model.legs
         self._joint_space, self._single = ClosureEngine(model), SingleTarget(model)
-        self.bounds_steps, self._keeps_apart = self._searches, len(links_of_legs(model).pairs) > 0
+        self.bounds_steps, self._keeps_apart = self.searches, len(links_of_legs(model).pairs) > 0
 
     @cached_property
     def _assembly(self) -> LegsAssembly:
         return assembly_of(self.model)
 
     @cached_property
-    def _searches(self) -> bool:
+    def searches(self) -> bool:
         """True if unreached targets are searched for in the platform's pose, before joint coordinates."""
         return not has_other_assemblies(self.model.path_closure)
 
@@ -159,7 +159,7 @@ class LegsEngine(Engine):
             return leg_answers(model, rows, sides, None, start, start_sides)
         unsolved, q = np.flatnonzero(rows.status != REACHED), None
         sides = np.repeat(sides, len(targets), axis=0) if len(sides) < len(targets) else sides.copy()
-        if self._searches:
+        if self.searches:
             q = np.full_like(sides, np.nan)
             request = request_from(model, options, start, start_sides, keep_mode, nearby)
             answer_unreached(request, targets, Answers(rows, q, sides), unsolved)
@@ -219,7 +219,7 @@ class LegsEngine(Engine):
     ) -> Iterator[Attempt]:
         """As `InverseEngine.attempts`: of the legs, then of the joint coordinates, which answer what legs leave."""
         last = None
-        if self._searches:
+        if self.searches:
             for last in attempts(self.model, target, start, self._sides_of(start), options, keep_mode=keep_mode):
                 yield last
         if last is None or last.ending != "reached":
@@ -250,7 +250,7 @@ class LegsEngine(Engine):
         on_progress: Callable[[int, int], None] | None,
     ) -> Configurations:
         """Solve a path (n, 4, 4) in one working mode, each target from the answer before it."""
-        if not self._searches:
+        if not self.searches:
             return self._joint_space.follow(targets, start, options, on_progress)
         targets, is_pose = np.require(targets, requirements=["C", "W"]), are_poses(targets)
         answers: list[Configurations] = []
@@ -316,7 +316,7 @@ class LegsEngine(Engine):
         """
         if counted == "orientation":
             return None if poses_decide(self.model) else GrownAnswers(self)
-        return self if self._searches and keeps_links(self.model) else None
+        return self if self.searches and keeps_links(self.model) else None
 
     def known(self, start: Configurations | None) -> Starts:
         """As `Grower.known`: by poses and sides."""

@@ -50,8 +50,8 @@ def objectives_of(
     projections = with_coarse(projection_modes(model.path_closure, hold, rotation_length, hold_price))
     other = "orientation" if len(projections) == 1 else None
     others = projection_modes(model.path_closure, other, rotation_length, hold_price)[:1]
-    objectives = [_objective(model, projection, settings) for projection in projections]
-    objectives += [_objective(model, projection, {**settings, "agreements": ALL_SEEDS}) for projection in others]
+    objectives = [objective_of(model, projection, settings) for projection in projections]
+    objectives += [objective_of(model, projection, {**settings, "agreements": ALL_SEEDS}) for projection in others]
     has_others = model.legs.has_implicit_joints and others[0] != projections[0]
     return objectives, len(projections), len(projections) if has_others else -1
 
@@ -64,14 +64,14 @@ def endings(
     settings["position"] = options.tolerance or TOLERANCES.position * model.length
     targets = np.repeat(target, len(starts.poses), axis=0)
     projections = modes_of(model.path_closure, options)
-    objectives = [_objective(model, projection, settings) for projection in projections]
+    objectives = [objective_of(model, projection, settings) for projection in projections]
     searches = [NearestPose(model, model.legs, *objective, no_starts(model.legs)) for objective in objectives]
     return [
         (projection, search.find(targets, starts)) for projection, search in zip(projections, searches, strict=True)
     ]
 
 
-def _objective(model: Model, projection: ProjectionMode, settings: Mapping[str, float]) -> Objective:
+def objective_of(model: Model, projection: ProjectionMode, settings: Mapping[str, float]) -> Objective:
     """The objective of one projection."""
     held = {
         "hold": projection.hold,

@@ -283,6 +283,7 @@ class DescentScratch(NamedTuple):
     balance: Floats  # (rows,): multipliers of the loops and of the held components
     here: Floats  # (columns,)
     there: Floats  # (columns,)
+    margins: Floats  # (limits,): how far inside each limit a descent stays, beyond the margin of all [rad or L]
     links: LinkLimits
     ways: Loops  # a path from the base to the body of each link
     way_eq: Equations
@@ -314,6 +315,7 @@ def new_descent_scratch(loops: Loops, links: LinkLimits, ways: Loops) -> Descent
         np.zeros(rows),
         np.zeros(n),
         np.zeros(n),
+        np.zeros(limits),
         new_link_limits(links),
         ways,
         new_equations(ways, LAYOUT),
@@ -419,6 +421,7 @@ def linearise_limits(loops: Loops, margin: float, state: State, scratch: Descent
     for j in range(n):
         for is_upper in range(2):
             h = loops.lo[j] + margin - state.q[j] if is_upper == 0 else state.q[j] - loops.hi[j] + margin
+            h += scratch.margins[2 * j + is_upper]
             if h > -REACH and scratch.elimination.used[j] > 0:
                 for a in range(linear.totals[0]["motions"]):
                     G[k, a] = -basis[j, a] if is_upper == 0 else basis[j, a]
@@ -427,7 +430,7 @@ def linearise_limits(loops: Loops, margin: float, state: State, scratch: Descent
                 excess = max(excess, h)
                 k += 1
     for cone in range(len(loops.cone_angles)):
-        h = cone_excess(loops, cone, margin, state, scratch)
+        h = cone_excess(loops, cone, margin + scratch.margins[2 * n + cone], state, scratch)
         if h > -REACH and scratch.elimination.used[loops.columns[loops.cone_units[cone, 0]]] > 0:
             for j in range(n):
                 row[j] = 0.0
@@ -438,11 +441,12 @@ def linearise_limits(loops: Loops, margin: float, state: State, scratch: Descent
     if links.kept[0] > 0:
         place_links(scratch.ways, state, scratch.way_eq, scratch.links)
     for pair in range(links.kept[0]):
-        h = pair_excess(scratch.links, pair, REACH) + margin
+        own_margin = margin + scratch.margins[offset + pair]
+        h = pair_excess(scratch.links, pair, REACH) + own_margin
         if h > -REACH:
             for j in range(n):
                 row[j] = 0.0
-            add_pair_slope(scratch.ways, scratch.links, pair, h - margin, 1.0, scratch.way_eq, scratch.row)
+            add_pair_slope(scratch.ways, scratch.links, pair, h - own_margin, 1.0, scratch.way_eq, scratch.row)
             excess = max(excess, h)
             k = add_limit(k, h, offset + pair, scratch.row, reduced)
     linear.totals[0]["limits"] = k

@@ -35,7 +35,7 @@ from .equations import (
     put_slopes,
 )
 from .limits import coordinate_slope, is_multiturn
-from .pose_constants import ASSEMBLED, FARTHEST_VALUE, FORWARD_STEPS, NEARLY_ASSEMBLED, ON_THE_WAY
+from .pose_constants import ASSEMBLED, BENT, FARTHEST_VALUE, FORWARD_STEPS, NEARLY_ASSEMBLED, ON_THE_WAY
 from .search import copy_platform_state, move
 from .search_records import Starts
 from .spheres import Spheres, new_spheres, put_sphere_errors, put_spheres, set_spheres
@@ -417,7 +417,7 @@ def load_start(table: Table, starts: Starts, start: int, scratch: NewtonScratch)
     if starts.q.shape[0] > 0:
         copy_row(starts.q[start], state.q)
     else:
-        place_proximal(table, scratch.state, scratch.leg_eval)
+        place_proximal(table, scratch.state, BENT, scratch.leg_eval)
 
 
 @routine

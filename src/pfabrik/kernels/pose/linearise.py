@@ -235,12 +235,13 @@ def linearise_limits(table: Table, margin: float, search: SearchScratch, reduced
         0,
         -math.inf,
     )
-    near, half_angles = search.near[0], search.half_angles
+    near, half_angles, margins = search.near[0], search.half_angles, search.margins
     cosine, sine = math.cos(near), math.sin(near)
     for i in range(table.limited.shape[0]):
         limited = table.limited[i]
         value = deviation(limited, values)
         below, above = limited["lo"] + margin - value, value - limited["hi"] + margin
+        below, above = below + margins[2 * i], above + margins[2 * i + 1]
         if max(below, above) <= -near:
             continue
         excess = max(excess, max(below, above))
@@ -252,19 +253,20 @@ def linearise_limits(table: Table, margin: float, search: SearchScratch, reduced
                 slope[j] = -slope[j]
             k = add_limit(k, below, 2 * i, search.leg_eval.slope, reduced)
     for i in range(search.n_cones[0]):
-        cone = table.cones[i]
+        cone, number = table.cones[i], 2 * table.limited.shape[0] + i
         line = vec(values[cone["leg"], cone["place"] :])
         if (
             half_angles[i, 0] <= near
+            or margins[number] > 0.0
             or dot(vec(cone["axis"]), line) <= half_angles[i, 1] * cosine + half_angles[i, 2] * sine
         ):
-            over = cone_slope(table, cone, search.leg_eval) - cone["half_angle"] + margin
+            over = cone_slope(table, cone, search.leg_eval) - cone["half_angle"] + margin + margins[number]
             excess = max(excess, over)
-            k = add_limit(k, over, 2 * table.limited.shape[0] + i, search.leg_eval.slope, reduced)
+            k = add_limit(k, over, number, search.leg_eval.slope, reduced)
     offset = 2 * table.limited.shape[0] + table.cones.shape[0]
     for leg in range(kept_sides.shape[0]):
         if kept_sides[leg] != 0.0:
-            over = kept_sides[leg] * dead_point_slope(table, leg, search.leg_eval)
+            over = kept_sides[leg] * dead_point_slope(table, leg, search.leg_eval) + margins[offset + leg]
             if over > -near:
                 excess = max(excess, over)
                 for j in range(slope.shape[0]):
@@ -275,12 +277,13 @@ def linearise_limits(table: Table, margin: float, search: SearchScratch, reduced
         place_links(table, search.links, search.leg_eval.frames, search.leg_eval.values)
     near = min(near, NEAR_LINKS)
     for pair in range(links.kept[0]):
-        over = pair_excess(search.links, pair, near) + margin
+        excess_of_pair = pair_excess(search.links, pair, near + margins[offset + pair])
+        over = excess_of_pair + margin + margins[offset + pair]
         if over > -near:
             excess = max(excess, over)
             for j in range(slope.shape[0]):
                 slope[j] = 0.0
-            add_pair_slope(table, search.links, pair, over - margin, 1.0, search.leg_eval, search.leg_eval.slope)
+            add_pair_slope(table, search.links, pair, excess_of_pair, 1.0, search.leg_eval, search.leg_eval.slope)
             k = add_limit(k, over, offset + pair, search.leg_eval.slope, reduced)
     reduced.linear.totals[0]["limits"] = k
     reduced.linear.totals[0]["excess"] = excess

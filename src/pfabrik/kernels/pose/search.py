@@ -50,6 +50,7 @@ class SearchScratch(NamedTuple):
     involved: Ints  # (legs,): 1 for legs that the Lagrangian depends on
     blocking: Ints  # (legs,): 1 for legs that block the incumbent
     near: Floats  # (1,): limits farther away are left out [rad or L]
+    margins: Floats  # (limits,): how far inside each limit a search stays, beyond the margin of all [rad or L]
     half_angles: Floats  # (cones, 3): half angles of all cones, their cosines and sines
     n_cones: Ints  # (1,): how many of these are constrained, the first ones
     links: LinkLimits
@@ -91,6 +92,7 @@ def new_search_scratch(table: Table, links: LinkLimits) -> SearchScratch:
         np.zeros(n_legs, np.int64),
         np.zeros(n_legs, np.int64),
         np.full(1, NEAR),
+        np.zeros(limits),
         half_angles,
         np.full(1, half_angles.shape[0]),
         new_link_limits(links),

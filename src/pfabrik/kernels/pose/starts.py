@@ -54,7 +54,7 @@ def load_start(table: Table, starts: Starts, start: int, search: SearchScratch) 
     if starts.q.shape[0] > 0:
         copy_row(starts.q[start], search.best.q)
     else:
-        place_proximal(table, search.best, search.leg_eval)
+        place_proximal(table, search.best, BENT, search.leg_eval)
 
 
 @routine
@@ -86,11 +86,11 @@ def take_along(by: Vec, along: Along, state: PlatformState) -> None:
 
 
 @routine
-def place_proximal(table: Table, state: PlatformState, leg_eval: LegEvaluation) -> None:
+def place_proximal(table: Table, state: PlatformState, bent: float, leg_eval: LegEvaluation) -> None:
     """Put proximal and redundant joints where the pose and the sides have them.
 
-    Joints at dead points are displaced a little to their sides: at a dead point the gradient does not show that they
-    can move, and a search would stay there.
+    Joints at dead points are displaced a little, by `bent`, to their sides: at a dead point the gradient does not show
+    that they can move, and a search would stay there.
     """
     q, sides = state.q, state.sides
     set_frames(state.pose, table.task[0], leg_eval.frames)
@@ -108,7 +108,7 @@ def place_proximal(table: Table, state: PlatformState, leg_eval: LegEvaluation) 
             q[k] = (
                 values[Q_PROXIMAL]
                 if abs(values[Q_PROXIMAL] - other_solution) >= STRETCHED
-                else values[Q_PROXIMAL] + BENT * sides[k]
+                else values[Q_PROXIMAL] + bent * sides[k]
             )
 
 
