@@ -88,6 +88,12 @@ print(f"{live.lag:.1f} mm from the target, at rest; held by {', '.join(live.hold
 #
 #     pfabrik track stewart recording.csv --live --speed 150 -o driven.csv --plot driven.png
 #
+# ## On a controller
+#
+# `pf.export_c(machine, "rig.c", parts=["ik", "limits", "live"], name="rig")`, or `pfabrik export stewart c -o rig.c
+# --parts ik,limits,live --name rig`, writes the same ticks in C: `rig_live_begin` and `rig_live_tick`, in memory of
+# yours. In double precision they are those of the library.
+#
 # ## What it costs
 #
 # A tick takes as long as a few answers of `Solver.ik`, near or out of reach, and allocates nothing. It looks around

@@ -21,15 +21,16 @@ from .configurations import Configurations
 from .engine_contract import Driven
 from .link_distances import pair_names
 from .placed_links import links_on_paths
+from .projection import modes_of
 
 
 class DrivenJoints(Driven):
     """As `Driven`, in joint coordinates."""
 
     def __init__(self, model: Model, options: Options, speeds: Floats, accelerations: Floats) -> None:
-        super().__init__(model, options)
+        super().__init__(model)
         closure, mechanism, length = model.closure, model.mechanism, model.length
-        mode, n = self._mode, len(closure.actuated)
+        mode, n = modes_of(closure, options)[-1], len(closure.actuated)
         loops = closure.loops._replace(lo=closure.loops.lo.copy(), hi=closure.loops.hi.copy())
         task, aim, drives = np.zeros(1, TASK), np.zeros(1, K.AIM), np.zeros(n, DRIVE)
         task["length"], task["axes"], task["rotations"] = length, model.task.axes, model.task.rotations

@@ -14,7 +14,7 @@ from ...options import Options
 from .attempts import Attempt
 from .close import Closing
 from .configurations import Configurations
-from .projection import ProjectionMode, modes_of
+from .projection import ProjectionMode
 
 OnProgress = Callable[[int, int], None]
 """Called with the number of targets solved, and of all."""
@@ -156,8 +156,8 @@ class Driven(ABC):
     tick: Record
     drives: Records
 
-    def __init__(self, model: Model, options: Options) -> None:
-        self._model, self._mode = model, modes_of(model.closure, options)[-1]
+    def __init__(self, model: Model) -> None:
+        self._model = model
 
     @abstractmethod
     def go_on(self, dt: float) -> int:

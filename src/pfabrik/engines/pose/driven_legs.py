@@ -19,6 +19,7 @@ from ..joints.configurations import Configurations, new_rows
 from ..joints.driven_joints import held_by
 from ..joints.engine_contract import Driven
 from ..joints.link_distances import pair_names
+from ..joints.projection import modes_of
 from .answers import leg_answers, sides_at
 from .nearest import OF_VALUES, objective_of
 from .nearest_pose import no_starts, search_plan
@@ -29,37 +30,12 @@ class DrivenLegs(Driven):
     """As `Driven`, in the platform's pose."""
 
     def __init__(self, model: Model, options: Options, speeds: Floats, accelerations: Floats) -> None:
-        super().__init__(model, options)
-        table = model.legs
-        settings = {"steps": MOST_STEPS, "rotation": options.rotation_tolerance}
-        settings["position"] = options.tolerance or TOLERANCES.position * model.length
-        aim = objective_of(model, self._mode, settings)
-        legs, plan = search_plan(model, table, [aim, OF_VALUES], no_starts(table))
-        own, n = legs._replace(limited=np.concatenate([legs.limited, legs.driven])), len(legs.driven)
-        columns, units, drives = own.driven["column"], own.driven["unit"], np.zeros(n, DRIVE)
-        drives["lo"], drives["hi"] = own.driven["lo"] + TOLERANCES.inside, own.driven["hi"] - TOLERANCES.inside
-        drives["speed"], drives["acceleration"] = speeds[columns] / units, accelerations[columns] / units
-        self._model, self._live = (
-            model,
-            K.LivePose(
-                local_table(table).record,
-                own,
-                plan,
-                drives,
-                np.zeros(1, TICK),
-                new_platform_state(len(table.legs)),
-                np.zeros(count_unknowns(own)),
-                np.eye(4),
-                np.zeros((1, n)),
-                np.eye(4)[None].copy(),
-                np.zeros(n),
-                np.eye(4),
-            ),
-        )
+        super().__init__(model)
+        self._live = live_tables(model, options, speeds, accelerations)
         self._handle, self._scratch = Handle(self._live), Handle(K.new_live_scratch(self._live))
         self._address = self._handle.address, self._scratch.address
         self.target, self.pose, self.actuators = self._live.targets[0], self._live.pose, self._live.actuators
-        self.tick, self.drives = self._live.tick[0], drives
+        self.tick, self.drives = self._live.tick[0], self._live.drives
 
     def go_on(self, dt: float) -> int:
         """As of `Driven`."""
@@ -73,13 +49,11 @@ class DrivenLegs(Driven):
 
     def place(self, configurations: Configurations) -> None:
         """As of `Driven`."""
-        live, own = self._live, self._live.search
+        live = self._live
         live.state.pose[:] = configurations.rows.poses[0]
         live.state.pose[:3, 3] /= self._model.length
         live.state.sides[:] = sides_at(self._model, configurations)[0]
         live.state.q[:] = 0.0
-        for bound in ("lo", "hi"):
-            own.limited[bound][-len(self.drives) :] = own.driven[bound]
         K.place_pose(*self._address)
 
     def coordinates(self) -> Floats:
@@ -131,3 +105,30 @@ class DrivenLegs(Driven):
         found = new_solutions(1, n, len(self.drives))
         nearest_pose(legs.address, plan.address, scratch.address, live.targets, none, start, found, weights)
         return np.asarray(weights[0])
+
+
+def live_tables(model: Model, options: Options, speeds: Floats, accelerations: Floats) -> K.LivePose:
+    """A machine of legs as kernels drive it, with the most speed and acceleration of each drive [per s and s^2]."""
+    table = model.legs
+    settings = {"steps": MOST_STEPS, "rotation": options.rotation_tolerance}
+    settings["position"] = options.tolerance or TOLERANCES.position * model.length
+    aim = objective_of(model, modes_of(model.path_closure, options)[-1], settings)
+    legs, plan = search_plan(model, table, [aim, OF_VALUES], no_starts(table))
+    own, n = legs._replace(limited=np.concatenate([legs.limited, legs.driven])), len(legs.driven)
+    columns, units, drives = own.driven["column"], own.driven["unit"], np.zeros(n, DRIVE)
+    drives["lo"], drives["hi"] = own.driven["lo"] + TOLERANCES.inside, own.driven["hi"] - TOLERANCES.inside
+    drives["speed"], drives["acceleration"] = speeds[columns] / units, accelerations[columns] / units
+    return K.LivePose(
+        local_table(table).record,
+        own,
+        plan,
+        drives,
+        np.zeros(1, TICK),
+        new_platform_state(len(table.legs)),
+        np.zeros(count_unknowns(own)),
+        np.eye(4),
+        np.zeros((1, n)),
+        np.eye(4)[None].copy(),
+        np.zeros(n),
+        np.eye(4),
+    )

@@ -88,6 +88,20 @@ int pfk_nearest(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_
 int pfk_ik_or_nearest(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose, pfk_real *actuators, int steps,
                       int starts, char *holding);
 #endif
+#if LIVE
+/* A machine that a stream of targets drives: whatever they are, every tick ends at a feasible pose, no drive is faster
+   than it may, and nothing leaps. `pfk_live_begin` lets the machine rest at a feasible pose, with the most that its
+   drives may [length or rad, per s and per s2], where an acceleration of 0 is no limit; it fills where they are then.
+   It returns what pfk_limits does, or PFK_NO_ACTUATORS for a speed that is not positive; nothing begins unless 0 is
+   returned. `pfk_live_tick` goes on for `dt` seconds, to the nearest pose that drives get to in time: 0 where that is
+   the target, else PFK_PROJECTED; for a target that is no pose drives slow down, and PFK_NO_POSE is returned, with
+   where they are. Limits
+   come before accelerations. */
+int pfk_live_begin(pfk_memory *memory, const pfk_pose *pose, const pfk_real speeds[PFK_ACTUATORS],
+                   const pfk_real accelerations[PFK_ACTUATORS], pfk_real actuators[PFK_ACTUATORS]);
+int pfk_live_tick(pfk_memory *memory, const pfk_pose *target, pfk_real dt, pfk_pose pose[1],
+                  pfk_real actuators[PFK_ACTUATORS]);
+#endif
 #if TURNS
 /* Adds whole turns to actuators that may turn more than once: nearest to those before. */
 int pfk_count_turns(pfk_memory *memory, const pfk_real before[PFK_ACTUATORS], pfk_real *now);
@@ -409,6 +423,33 @@ int pfk_ik_or_nearest(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose
         return pfk_compute_nearest(memory, target, pose, actuators, steps, starts, holding);
     for (i = 0; i < PFK_LIMITS && holding; ++i)
         holding[i] = !code && memory->reaching_slack[i] <= PFK_ACTIVE * pfk_limit_units[i];
+    return code;
+}
+
+#endif
+#if LIVE
+int pfk_live_begin(pfk_memory *memory, const pfk_pose *pose, const pfk_real speeds[PFK_ACTUATORS],
+                   const pfk_real accelerations[PFK_ACTUATORS], pfk_real actuators[PFK_ACTUATORS])
+{
+    pfk_real own[16];
+    int i;
+    const int code = (int)pfk_begin_stream(&memory->streaming, &memory->reaching, pfk_opened(pose, own),
+                                           pfk_opened_row(speeds, PFK_ACTUATORS),
+                                           pfk_opened_row(accelerations, PFK_ACTUATORS));
+    for (i = 0; i < PFK_ACTUATORS; ++i)
+        actuators[i] = memory->streaming_live_actuators[i];
+    return code;
+}
+
+int pfk_live_tick(pfk_memory *memory, const pfk_pose *target, pfk_real dt, pfk_pose pose[1],
+                  pfk_real actuators[PFK_ACTUATORS])
+{
+    pfk_real own[16];
+    int i;
+    const int code = (int)pfk_drive_to(&memory->streaming, pfk_opened(target, own), dt);
+    for (i = 0; i < PFK_ACTUATORS; ++i)
+        actuators[i] = memory->streaming_live_actuators[i];
+    pfk_close(memory->streaming_live_pose, pose);
     return code;
 }
 

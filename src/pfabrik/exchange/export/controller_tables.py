@@ -11,6 +11,7 @@ from ...capabilities.dynamics.moving_rows import Probes, moving_of
 from ...capabilities.dynamics.weights import weights_of
 from ...common.arrays import Records
 from ...engines.joints.assemble import is_over_determined
+from ...engines.pose.driven_legs import live_tables
 from ...engines.pose.nearest_pose import home_start, no_starts
 from ...engines.pose.rotation import keeps_rotation
 from ...engines.pose.seeds import seeds_of
@@ -27,10 +28,12 @@ from ...kernels.controller.links_on_bodies import LinksOnBodies
 from ...kernels.controller.projected import Projecting
 from ...kernels.controller.rates import Rating
 from ...kernels.controller.reached import Reaching
+from ...kernels.controller.streamed import Streaming
 from ...kernels.dynamics.moving import new_exerted, new_moving_scratch
 from ...kernels.legs.answer import Completion, new_completion
 from ...kernels.pose.equations import LegEvaluation, new_leg_evaluation
 from ...kernels.pose.forward import NewtonScratch, new_newton_scratch
+from ...kernels.pose.live_pose import new_live_scratch
 from ...kernels.pose.search_records import Starts, new_solutions
 from ...kernels.pose.tables import EXACTLY, NEAREST, QUESTION, Question, Start, new_answer_scratch
 from ...kinematics import JointPath, Model, model_of, task_of, tilt_axis
@@ -57,6 +60,7 @@ class ControllerTables(NamedTuple):
     series: Series | None
     projecting: Projecting | None
     driving: Driving | None
+    streaming: Streaming | None
 
 
 def controller_tables(machine: Machine, parts: Sequence[str], path: JointPath | None = None) -> ControllerTables:
@@ -82,7 +86,8 @@ def controller_tables(machine: Machine, parts: Sequence[str], path: JointPath | 
     if "nearest" in parts:
         projecting = _projecting(model, reaching, Options(hold_price=machine.hold_price))
     driving = _driving(machine) if "effort" in parts else None
-    return ControllerTables(reaching, assembling, rating, series, projecting, driving)
+    streaming = _streaming(machine, model, reaching) if "live" in parts else None
+    return ControllerTables(reaching, assembling, rating, series, projecting, driving, streaming)
 
 
 def _reaching(machine: Machine, model: Model, parts: Sequence[str]) -> Reaching:
@@ -250,6 +255,14 @@ def _projecting(model: Model, reaching: Reaching, options: Options) -> Projectin
         np.zeros((1, 4, 4)),
         np.zeros(2, np.int64),
     )
+
+
+def _streaming(machine: Machine, model: Model, reaching: Reaching) -> Streaming:
+    n_a, options = len(machine.driven), Options(hold_price=machine.hold_price)
+    live = live_tables(model, options, np.ones(n_a), np.full(n_a, np.inf))
+    scratch = new_live_scratch(live)
+    search = scratch.search._replace(leg_eval=_shared(scratch.search.leg_eval, reaching.scratch))
+    return Streaming(live, scratch._replace(completion=reaching.scratch, search=search))
 
 
 def _emptied(value: Any) -> Any:

@@ -21,7 +21,7 @@ from .machine_data import Machine, fitting_path
 from .source import source
 from .static_data import Precision
 
-Part: TypeAlias = Literal["ik", "limits", "fk", "rates", "nearest", "bodies", "effort"]
+Part: TypeAlias = Literal["ik", "limits", "fk", "rates", "nearest", "live", "bodies", "effort"]
 PARTS: tuple[Part, ...] = get_args(Part)
 _NAME = re.compile(r"[a-z][a-z0-9_]*", re.ASCII)
 
@@ -58,7 +58,8 @@ def export_c(
         number of the one exceeded most, and the clearance of a machine that has one: "ik" and "fk" then return the
         number of a pair of links that is too near; "fk" from actuators to the pose, by Newton's method from a start;
         "rates" the Jacobian, speeds of actuators, and torques of them and back; "nearest", with "ik" and "limits", the
-        nearest feasible pose to a target out of reach; "bodies" where every body is at a pose, for pictures;
+        nearest feasible pose to a target out of reach; "live", with them too, ticks along a stream, as of `Live`;
+        "bodies" where every body is at a pose, for pictures;
         "effort" the forces of the actuators in motion, of a machine with masses. By default all but "bodies" and
         "effort", and without "nearest" where the machine has none.
     name : str, optional
@@ -124,8 +125,9 @@ def c_source(
     require_choice("precision", precision, get_args(Precision))
     if parts is not None and not set(PARTS) >= set(require_names("parts", parts)) > set():
         raise InvalidArgument("parts", repr(parts), f"some of {', '.join(map(repr, PARTS))}")
-    if parts is not None and "nearest" in parts and not {"ik", "limits"} <= set(parts):
-        raise InvalidArgument("parts", repr(parts), "'ik' and 'limits' too, for 'nearest' is made of them")
+    for part in ("nearest", "live"):
+        if parts is not None and part in parts and not {"ik", "limits"} <= set(parts):
+            raise InvalidArgument("parts", repr(parts), f"'ik' and 'limits' too, for '{part}' is made of them")
     require_identifier(name)
     require_positive("hold_price", hold_price)
     equal_rods: list[str] = []
@@ -134,8 +136,8 @@ def c_source(
     machine = Machine(mechanism, hold_price, equal_rods)
     if parts is None:
         parts = parts_of(machine)
-    if "nearest" in parts and machine.why_no_nearest:
-        reason = f"{machine.why_no_nearest}: leave 'nearest' out of `parts` (--parts ik,limits,fk,rates)"
+    for part in {"nearest", "live"} & {*parts} if machine.why_no_nearest else ():
+        reason = f"{machine.why_no_nearest}: leave '{part}' out of `parts` (--parts ik,limits,fk,rates)"
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
     if "effort" in parts and (reasons := unplaced_masses(machine.mechanism, machine.bodies)):
         raise UnsupportedMechanism(mechanism.name, reasons, "exported with 'effort'")
@@ -154,7 +156,7 @@ def c_source(
 
 def parts_of(machine: Machine) -> list[Part]:
     """All parts of a machine's file but those that are named alone."""
-    left_out = ("bodies", "effort", *(["nearest"] if machine.why_no_nearest else []))
+    left_out = ("bodies", "effort", "live", *(["nearest"] if machine.why_no_nearest else []))
     return [part for part in PARTS if part not in left_out]
 
 

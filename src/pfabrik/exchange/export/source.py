@@ -211,7 +211,7 @@ def features(machine: Machine, parts: Sequence[str], path: JointPath | None = No
         "TO_ACTUATORS": path is not None and "ik" in parts,
         "TORQUES": path is None and "rates" in parts,
         "TO_JOINTS": path is not None and "fk" in parts,
-        "RESTS": {"limits", "nearest"} & {*parts} or (path is not None and "ik" in parts),
+        "RESTS": {"limits", "nearest", "live"} & {*parts} or (path is not None and "ik" in parts),
     }
     return {part.upper() for part in parts} | {name for name, holds in conditions.items() if holds}
 

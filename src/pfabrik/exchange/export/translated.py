@@ -17,6 +17,7 @@ from ...kernels.controller.joints_in_series import put_joints, walk
 from ...kernels.controller.projected import project_target
 from ...kernels.controller.rates import put_rates
 from ...kernels.controller.reached import measure, put_bodies, put_reached, put_turns, reach, rest, stretched_leg
+from ...kernels.controller.streamed import begin_stream, drive_to
 from ...kernels.legs import records as K
 from ...kernels.pose.search_records import SETTINGS
 from ...kernels.pose.tables import MACHINE
@@ -33,6 +34,7 @@ SINGLE = {
     ("kernels.legs.leg_constants", "LEAST_MARGIN"): 1e-3,
     ("kernels.pose.pose_constants", "ASSEMBLED"): 1e-6,
     ("kernels.pose.pose_constants", "NEARLY_ASSEMBLED"): 1e-5,
+    ("kernels.pose.live_pose", "STRAIGHT"): 3e-3,
     ("kernels.search_constants", "CLOSED"): 1e-6,
     ("kernels.search_constants", "NEARLY_CLOSED"): 1e-5,
     ("kernels.search_constants", "FINE"): 1e-5,
@@ -131,6 +133,8 @@ def _translation(program: Program, tables: ControllerTables, conditions: set[str
         ("JOINTS", walk, (tables.series, row)),
         ("TO_JOINTS", put_joints, (tables.series, assembling, reaching, row, row)),
         ("EFFORT", put_exerted, (tables.driving, reaching, matrix, row, row, row, row)),
+        ("LIVE", begin_stream, (tables.streaming, reaching, matrix, row, row)),
+        ("LIVE", drive_to, (tables.streaming, matrix, 0.0)),
         ("NEAREST", stretched_leg, (reaching.near, reaching.scratch)),
         ("NEAREST", project_target, (tables.projecting, reaching, matrix, matrix, row, number, number, number)),
     ]
@@ -223,6 +227,12 @@ def _constants(tables: ControllerTables) -> Iterator[tuple[str, Any, tuple[str, 
     if driving is not None:
         yield "driving.moving", driving.moving, tuple(each for each in driving.moving._fields if each != "gravity")
         yield "driving", driving, ("numbers", "axes", "tilts", "units")
+    if tables.streaming is not None:
+        live = tables.streaming.live
+        yield "streaming.live", live, ("near",)
+        yield "streaming.live.search", live.search, tuple(each for each in live.search._fields if each != "limited")
+        yield "streaming.live.plan", live.plan, tuple(each for each in live.plan._fields if each != "links")
+        yield "streaming.live.plan.links", live.plan.links, LINKS
     if projecting is not None:
         own, plan = projecting.tables, projecting.tables.plan
         yield "projecting.tables", own, tuple(each for each in own._fields if each != "plan")

@@ -68,6 +68,11 @@ DIRECT = 0.84
 """Least share of a tick at full speed by which drives are to come nearer in it to a target that legs reach."""
 
 
+STRAIGHT = STRETCHED
+"""Difference of the two solutions of a proximal joint below which a tick also begins beside its dead point [rad or L]:
+3e-3 in single precision, which has half of its digits there."""
+
+
 class LivePose(NamedTuple):
     """A machine whose legs are driven, where it is, and the memory of a tick."""
 
@@ -159,7 +164,7 @@ def bend(own: LivePose, state: PlatformState, leg_eval: LegEvaluation) -> bool:
             solve_proximal(leg, end, -sides[k], values)
             other = values[Q_PROXIMAL]
             solve_proximal(leg, end, sides[k], values)
-            if abs(wrap(values[Q_PROXIMAL] - other, 0.0)) < STRETCHED:
+            if abs(wrap(values[Q_PROXIMAL] - other, 0.0)) < STRAIGHT:
                 for i in range(drives.shape[0]):
                     if table.limited[first + i]["leg"] == k:
                         room = min(room, 0.5 * (drives[i]["most"] - drives[i]["least"]))
@@ -426,11 +431,21 @@ def tick_pose(live: int, scratch_address: int, dt: float) -> int:
     return int(own.tick[0]["status"])
 
 
-@search
-def place_pose(live: int, scratch_address: int) -> None:
-    """Fill pose, actuators and the values of drives of a machine that rests at `LivePose.state`."""
-    own, scratch = open_live(live), open_scratch(scratch_address)
+@routine
+def place(own: LivePose, scratch: LiveScratch) -> None:
+    """Fill pose, actuators and the values of drives of a machine that rests at its state, as far as pose and sides."""
+    drives, limited = own.drives, own.search.limited
+    for i in range(drives.shape[0]):
+        place_of_drive = limited.shape[0] - drives.shape[0] + i
+        limited[place_of_drive]["lo"] = own.search.driven[i]["lo"]
+        limited[place_of_drive]["hi"] = own.search.driven[i]["hi"]
     for j in range(own.step.shape[0]):
         own.step[j] = 0.0
     place_proximal(own.search, own.state, 0.0, scratch.search.leg_eval)
     put_outputs(own, scratch, 0.0)
+
+
+@search
+def place_pose(live: int, scratch_address: int) -> None:
+    """Let a machine rest where `LivePose.state` has it; parameters as of `tick_pose`."""
+    place(open_live(live), open_scratch(scratch_address))
