@@ -8,7 +8,7 @@ import numpy as np
 
 from ...capabilities.clearance.solid_meshes import solids_of
 from ...common.arrays import Floats
-from ...kinematics import Model, columns, links_of, plane_of
+from ...kinematics import columns, links_of, plane_of
 from ...machine.common_centre import common_centre
 from ...machine.description.home_mobility import joint_screws
 from ...machine.description.mechanism import Joint, Mechanism
@@ -28,11 +28,10 @@ PAINTS = {"base": "base", "platform": "platform", "link": "link"}
 class _Drawing:
     """Points and frames by their indices, as they are needed."""
 
-    def __init__(self, model: Model) -> None:
-        self.mechanism, self.length = model.mechanism, model.length
+    def __init__(self, mechanism: Mechanism, known: frozenset[int] | None) -> None:
+        self.mechanism, self.length = mechanism, mechanism.characteristic_length
         self.home = joint_places(self.mechanism, None, self.mechanism.home_pose[:3, 3])
-        self.known = {int(column) for column in model.legs.known["column"]}
-        self.known |= {drive.column for drive in self.mechanism.drives}
+        self.known = known
         self.frames: list[list[Any]] = []
         self.bodies = self._bodies()
         self.points: list[dict[str, Any]] = []
@@ -43,9 +42,9 @@ class _Drawing:
     def _bodies(self) -> dict[str, int]:
         """The frame of every body that known coordinates place: 0 the base, 1 the platform, then `frames`."""
         mechanism = self.mechanism
-        bodies = {mechanism.base: 0}
-        if not mechanism.end_effector_is_joint:
-            bodies[mechanism.end_effector_body] = 1
+        bodies = {body: k for k, body in enumerate(_first_bodies(mechanism))}
+        if self.known is None:
+            return bodies | {body: 2 + k for k, body in enumerate(other_bodies(mechanism))}
         placed = list(bodies)
         for body in placed:  # which grows
             for joint in mechanism.joints:
@@ -66,7 +65,7 @@ class _Drawing:
             return []
         span = columns(self.mechanism)[joint.name]
         its_columns = range(span.start, span.stop)
-        if joint.type == "spherical" or not self.known.issuperset(its_columns):
+        if joint.type == "spherical" or self.known is None or not self.known.issuperset(its_columns):
             return None
         screws: list[list[float]] = joint_screws(self.mechanism, joint).tolist()
         return [[column, 1, screw[:3], screw[3:]] for column, screw in zip(its_columns, screws, strict=True)]
@@ -167,9 +166,25 @@ def _normal(points: list[Floats]) -> Floats:
     return np.asarray(normal if normal[2] >= 0.0 else -normal)
 
 
-def drawing_of(model: Model, box: Floats) -> dict[str, Any]:
-    """The drawing as data, lengths in L; `box` holds the lowest and highest positions of the end effector [length]."""
-    mechanism, drawing = model.mechanism, _Drawing(model)
+def _first_bodies(mechanism: Mechanism) -> list[str]:
+    """The base, and the platform where the end effector is a body."""
+    return [mechanism.base] + [mechanism.end_effector_body] * (not mechanism.end_effector_is_joint)
+
+
+def other_bodies(mechanism: Mechanism) -> list[str]:
+    """All bodies beside base and platform, in the order of the frames that an answer of Python's has."""
+    return [body for body in mechanism.bodies if body not in _first_bodies(mechanism)]
+
+
+def drawing_of(mechanism: Mechanism, known: frozenset[int] | None, box: Floats) -> dict[str, Any]:
+    """The drawing as data, lengths in L.
+
+    Parameters
+    ----------
+    known : the columns of the coordinates that the page computes; None where answers bring the frames of all bodies.
+    box : lowest and highest positions of the end effector [length].
+    """
+    drawing = _Drawing(mechanism, known)
     parts = [drawing.part(part) for part in parts_of(mechanism)]
     end = joints_on(mechanism, mechanism.end_effector) or [mechanism.end_effector]
     plane = plane_of(mechanism)
@@ -180,7 +195,7 @@ def drawing_of(model: Model, box: Floats) -> dict[str, Any]:
         "platform": [drawing.indices[name] for name in end],
         "end": drawing.bodies.get(mechanism.end_effector_body, 1),
         "normal": None if plane is None else np.cross(*plane).tolist(),
-        "thickness": THICKNESS * size_of(mechanism) / model.length,
+        "thickness": THICKNESS * size_of(mechanism) / mechanism.characteristic_length,
         **_view(mechanism, plane, box),
     }
 
