@@ -22,8 +22,16 @@ FOLLOWS = 0.5  # of a millimetre: a pixel is larger
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def started() -> Iterator[Any]:
     yield from chromium()
+
+
+@pytest.fixture
+def browser(started: Any) -> Iterator[Any]:
+    """The browser, whose pages are closed in the end."""
+    yield started
+    for context in started.contexts:
+        context.close()
 
 
 @pytest.fixture(scope="module")
@@ -77,9 +85,8 @@ def test_a_link_opens_at_the_pose_that_it_was_copied_at(browser: Any, address: C
     assert target(page)[:3, 3] == pytest.approx([10.0, -20.0, 200.0], abs=1e-6)
 
 
-@BOTH
-def test_a_slider_drives_an_actuator(browser: Any, address: Callable[..., str], form: str) -> None:
-    page, _ = opened(browser, address(pf.load("five_bar"), form), **DESK)
+def test_a_slider_drives_an_actuator(browser: Any, address: Callable[..., str]) -> None:
+    page, _ = opened(browser, address(pf.load("five_bar")), **DESK)
     slider = page.locator("#actuators input").first
     slider.focus()
     for _ in range(3):

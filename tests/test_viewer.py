@@ -380,6 +380,8 @@ def test_what_cannot_be_shown_is_refused(shown: Callable[..., pf.Viewer]) -> Non
         pf.view(pf.solve_ik(machine, [[0, 0, 180], [0, 0, 190]]))
     with pytest.raises(InvalidArgument, match="from 1 to 65535"):
         pf.view(machine, port=0)
+    with pytest.raises(InvalidArgument, match="an address of this computer"):
+        pf.view(machine, host="203.0.113.7", port=18080)
     with pytest.raises(InvalidArgument, match="one Solution of"):
         shown(machine).show(pf.solve_ik(tripod_rps(), (0, 0, 210)))
 

@@ -26,8 +26,16 @@ IN_VIEW = """(names) => names.every((name) => {
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def started() -> Iterator[Any]:
     yield from chromium()
+
+
+@pytest.fixture
+def browser(started: Any) -> Iterator[Any]:
+    """The browser, whose pages are closed in the end."""
+    yield started
+    for context in started.contexts:
+        context.close()
 
 
 @pytest.fixture
@@ -120,6 +128,9 @@ def test_an_arm_without_closed_forms_is_answered_by_python(browser: Any, shown: 
     until(page, settled)
     expected = pf.solve_ik(viewer.mechanism, target(page), start=viewer.solution)
     assert page.evaluate("page.session.answer.actuators") == pytest.approx(expected.actuators, abs=1e-6)
+    drawn = dict(page.evaluate("[...page.scene.names].map(([name, k]) => [name, page.scene.points[k]])"))
+    for name, place in expected.points.items():
+        assert np.multiply(drawn[name], viewer.mechanism.characteristic_length) == pytest.approx(place, abs=1e-3)
     assert np.linalg.norm(viewer.target[:3, 3] - viewer.mechanism.home_pose[:3, 3]) > 50.0
     again, _ = opened(browser, page.evaluate("location.origin + location.pathname + page.session.link"), **WIDE)
     until(again, settled)

@@ -7,6 +7,7 @@ name that was given.
 
 from __future__ import annotations
 
+import errno
 import ipaddress
 import json
 import os
@@ -23,6 +24,7 @@ from http.server import BaseHTTPRequestHandler
 from typing import Any, NamedTuple, TypeAlias
 from urllib.parse import urlsplit
 
+from ...errors import InvalidArgument
 from .page_json import as_json
 
 MOST_BYTES = 4_000_000
@@ -38,6 +40,7 @@ HEADERS = {
     "Cache-Control": "no-store",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
+    "Cross-Origin-Resource-Policy": "same-origin",
     "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; "
     "style-src 'unsafe-inline'; connect-src 'self'; img-src data:; base-uri 'none'; form-action 'none'",
 }
@@ -89,17 +92,24 @@ class PageServer(socketserver.ThreadingTCPServer):
         self._pages: set[Queue] = set()
         self._lock = threading.Lock()
         self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        for number in range(port, min(port + MOST_PORTS, 65536)):
-            try:
-                super().__init__((host, number), _Request)
-                break
-            except OSError as error:
-                taken = error
-        else:
-            raise taken
-        self.port = int(self.server_address[1])
+        self.port = self._bind(host, port)
         self._thread = threading.Thread(target=self.serve_forever, args=(0.1,), daemon=True)
         self._thread.start()
+
+    def _bind(self, host: str, first: int) -> int:
+        """Listen at the first port that is free, and return it."""
+        last = min(first + MOST_PORTS, 65536)
+        for port in range(first, last):
+            try:
+                super().__init__((host, port), _Request)
+            except OSError as error:
+                if error.errno == errno.EADDRINUSE:
+                    continue
+                raise InvalidArgument(
+                    "host", f"'{host}' at port {port}: {error.strerror}", "an address of this computer"
+                ) from error
+            return port
+        raise InvalidArgument("port", f"{first} to {last - 1}, all taken", "a port that is free")
 
     @property
     def url(self) -> str:

@@ -60,7 +60,7 @@ def view(shown: Mechanism | Solution | str | os.PathLike[str], *, port: int = PO
     Raises
     ------
     InvalidArgument
-        A batch that is no Track, or no port.
+        A batch that is no Track, or an address or a port where nothing can be served.
     """
     require_count("port", port, most=65535)
     return Viewer(shown, port, host)

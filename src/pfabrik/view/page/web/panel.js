@@ -88,8 +88,9 @@ class Panel {
   }
 
   drive(k, value) {
-    const { answer, wished } = this.session;
-    const values = (wished ?? answer.actuators).map((each, i) => (i === k ? value : (answer.actuators?.[i] ?? each)));
+    const { answer, wished, start, engine } = this.session;
+    const last = wished ?? answer.actuators ?? start?.actuators ?? engine.home.actuators;
+    const values = last.map((each, i) => (i === k ? value : (answer.actuators?.[i] ?? each)));
     this.session.assemble(values, `actuator ${k}`);
   }
 
