@@ -95,6 +95,10 @@ def test_a_slider_drives_an_actuator(browser: Any, address: Callable[..., str]) 
     expected = pf.solve_fk(machine, page.evaluate("page.session.answer.actuators"))
     assert np.reshape(page.evaluate("page.session.answer.pose"), (4, 4)) == pytest.approx(expected.pose, abs=1e-6)
     assert page.evaluate("page.session.answer.actuators[0]") > machine.drives[0].home
+    until(page, "!page.later && page.session.past.length > 0")
+    page.locator("#undo").click()  # a slider that goes on without a pause makes one step
+    assert target(page) == pytest.approx(machine.home_pose)
+    assert page.locator("#fields input").evaluate_all("(all) => all.map((each) => each.ariaLabel)") == ["y", "z"]
 
 
 def test_a_drag_through_a_parallel_singularity_keeps_its_mode_and_the_page_says_that_it_passed(

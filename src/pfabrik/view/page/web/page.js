@@ -40,6 +40,7 @@ class Page {
     this.view = new Canvas(element);
     this.gestures = new Gestures(element, this);
     new ResizeObserver(() => this.redraw()).observe(element);
+    this.keepInView();
     this.redraw();
   }
 
@@ -53,13 +54,27 @@ class Page {
 
   /** Show what is asked for, and the answer as it is. */
   showAsked() {
-    const { session, gizmo, scene } = this;
+    const { session, gizmo } = this;
     gizmo.show(session.target, session.answer.pose);
     this.panel.show();
-    if (this.view && !this.gestures.held) {
-      this.resize();
-      scene.camera.keepInView([...scene.platformAt(session.target), gizmo.centre]);
-    }
+    if (this.view && !this.gestures.held) this.keepInView();
+    this.redraw();
+  }
+
+  /** Step back where what is asked for has left the picture, unless one looks elsewhere. */
+  keepInView() {
+    const { session, gizmo, scene } = this;
+    const { camera } = scene;
+    const points = () => [...scene.platformAt(session.target), ...gizmo.letters.map(([, place]) => place)];
+    this.resize();
+    if (!this.seen || camera.sees(this.seen)) camera.keepInView(points);
+    this.seen = points();
+  }
+
+  lookFrom(angles) {
+    this.scene.camera.lookFrom(angles);
+    this.seen = null;
+    if (this.view) this.keepInView();
     this.redraw();
   }
 
@@ -198,7 +213,7 @@ class Page {
     isNarrow.addEventListener("change", place);
     place();
     for (const [name, angles] of Object.entries(this.machine.views)) {
-      const onclick = () => this.scene.camera.lookFrom(angles) ?? this.redraw();
+      const onclick = () => this.lookFrom(angles);
       $("#views").append(made("button", { textContent: name, title: `Look from: ${name}`, onclick }));
     }
     const dark = matchMedia("(prefers-color-scheme: dark)");

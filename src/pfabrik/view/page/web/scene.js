@@ -178,13 +178,17 @@ class Camera {
     Object.assign(this, this.start, { azimuth, elevation: clamp(elevation, -UPRIGHT, UPRIGHT) });
   }
 
-  /** Step back until points are in the picture, if need be. */
-  keepInView(points) {
-    const isWithin = (point) => {
-      const [x, y] = this.onScreen(point), { width, height, covered } = this;
+  sees(points) {
+    const { width, height, covered } = this;
+    return points.every((point) => {
+      const [x, y] = this.onScreen(point);
       return x > ROOM && x < width * (1 - covered) - ROOM && y > ROOM && y < height - ROOM;
-    };
-    for (let n = 0; n < MOST_STEPS_BACK && !points.every(isWithin); n++) {
+    });
+  }
+
+  /** Step back until the points that a function returns are in the picture. */
+  keepInView(points) {
+    for (let n = 0; n < MOST_STEPS_BACK && !this.sees(points()); n++) {
       this.distance *= 1.06;
       this.look();
     }
