@@ -131,7 +131,9 @@ def test_what_is_no_question_is_refused(shown: Callable[..., pf.Viewer], body: s
         connection.endheaders(body.encode() if status != 413 else None)
         assert connection.getresponse().status == status
     assert "error" in asked(viewer, "ask", target=[1.0], asked="pose")[0]
+    assert "error" in asked(viewer, "state", target=[1.0], asked="pose")[0]
     assert "error" in asked(viewer, "unheard_of")[0]
+    assert viewer.target == pytest.approx(viewer.mechanism.home_pose)
 
 
 def test_a_taken_port_is_told_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -185,7 +187,7 @@ def test_python_answers_a_page_that_cannot(shown: Callable[..., pf.Viewer]) -> N
         assert answer["actuators"] == pytest.approx(expected.actuators, abs=1e-9)
         assert len(answer["frames"]) == len(machine.bodies) - 2
     values = [0.1, -0.5, 0.0, -2.0, 0.0, 1.5, 0.5]
-    (answer,) = asked(viewer, "ask", asked="actuators", values=values, answer=start)
+    (answer,) = asked(viewer, "ask", asked="actuators", values=values, target=start["pose"], answer=start)
     assert np.reshape(answer["pose"], (4, 4)) == pytest.approx(pf.solve_fk(machine, values).pose)
     more = asked(viewer, "more", answer=start, directions=[["along", [0, 0, 1]], ["about", [0, 0, -1]]])
     here = configuration_from(machine, start)

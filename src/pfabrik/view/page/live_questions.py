@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -72,11 +73,7 @@ class LiveQuestions:
         """What is nearest to an answer: limits, other links; where the page does not know: singularities, travel."""
         here = configuration_from(mechanism, asked["answer"])
         limits = limits_left(here)
-        bars = [
-            {"name": left.name, "margin": left.margin, "left": left.left, "unit": left.unit}
-            | {"isOn": abs(left.margin) <= TOLERANCES.active}
-            for left in limits[:BARS]
-        ]
+        bars = [asdict(left) | {"isOn": abs(left.margin) <= TOLERANCES.active} for left in limits[:BARS]]
         send({"limits": bars, "others": max(0, len(limits) - BARS), "distance": _distance(here)})
         if why_no_page(model_of(mechanism)):
             home = configuration(mechanism, home_coordinates(mechanism))

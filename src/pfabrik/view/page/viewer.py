@@ -117,7 +117,7 @@ class Viewer:
     @property
     def target(self) -> Floats:
         """The target pose, (4, 4) [length]."""
-        return np.reshape(self._state["target"], (4, 4)).astype(float)
+        return np.array(self._state["target"])
 
     def show(self, solution: Solution) -> None:
         """Show a configuration of this machine, in all pages."""
@@ -195,8 +195,9 @@ class Viewer:
 
     def _note(self, mechanism: Mechanism, state: dict[str, Any]) -> None:
         """Keep what a page says of itself; the answer is computed when a program asks for it."""
+        target = np.reshape(np.array(state["target"], float), (4, 4))
         with self._lock:
-            self._mechanism, self._state, self._solution = mechanism, state, None
+            self._mechanism, self._state, self._solution = mechanism, state | {"target": target}, None
 
     def _first(self) -> dict[str, Any]:
         """The configuration that pages open in, as they take it, and if it is without limits."""

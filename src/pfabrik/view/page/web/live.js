@@ -9,8 +9,8 @@ class Live {
     this.states = new Newest("state", () => {});
     this.listen();
     this.addButtons();
-    if (machine.live.fault) this.tell(machine.live.fault, true);
-    if (location.hash || this.free) this.note();
+    if (machine.live.fault) this.say(machine.live.fault, true);
+    if (location.hash || this.free) this.report();
   }
 
   listen() {
@@ -18,7 +18,7 @@ class Live {
     const events = new EventSource("events");
     const on = (name, then) => events.addEventListener(name, ({ data }) => then(JSON.parse(data)));
     on("version", (version) => version !== machine.live.version && location.reload());
-    on("fault", (fault) => this.tell(fault, true));
+    on("fault", (fault) => this.say(fault, true));
     on("show", ({ free, ...answer }) => {
       if (free !== this.free) location.href = this.place(free);
       else page.session.take(received(answer));
@@ -38,7 +38,7 @@ class Live {
   }
 
   /** A note on progress, or on what went wrong. */
-  tell(words, isAlarming = false) {
+  say(words, isAlarming = false) {
     $("#note").textContent = words;
     $("#note").className = isAlarming ? "alarming" : "";
   }
@@ -49,7 +49,7 @@ class Live {
   }
 
   /** Tell the program what is shown. */
-  note() {
+  report() {
     this.states.ask(() => this.asked());
   }
 
@@ -63,7 +63,7 @@ class Live {
       const asked = this.asked({ directions: ways.map(({ kind, vector }) => [kind, vector]) });
       for await (const { error, limits, others, distance, singular, atHome, reach } of answersTo("more", asked, signal)) {
         if (signal.aborted) return;
-        if (error) this.tell(error, true);
+        if (error) this.say(error, true);
         if (limits) page.panel.showLimits(limits, others);
         if (distance !== undefined) page.distance = distance;
         if (singular) page.panel.showSingular(singular, atHome);
@@ -135,26 +135,26 @@ class Live {
   async findBorders() {
     this.search?.abort();
     const names = BORDERS.filter((name) => $(`#${name}`).getAttribute("aria-pressed") === "true");
-    if (!names.length) return this.tell("");
+    if (!names.length) return this.say("");
     const { signal } = (this.search = new AbortController());
     try {
       for await (const { error, note, border, patches } of answersTo("borders", this.asked({ names }), signal)) {
         if (signal.aborted) return;
-        if (error) this.tell(error, true);
-        if (note !== undefined) this.tell(note);
+        if (error) this.say(error, true);
+        if (note !== undefined) this.say(note);
         if (border) this.show(border, patches);
       }
     } catch (error) {
-      if (error.name !== "AbortError") this.tell(String(error.message ?? error), true);
+      if (error.name !== "AbortError") this.say(String(error.message ?? error), true);
     }
   }
 
   /** List all modes of the pose, or of the actuator values, to choose from. */
   async findModes(kind) {
     const { session } = this.page;
-    this.tell(`looking for ${kind} modes …`);
+    this.say(`looking for ${kind} modes …`);
     for await (const { error, modes } of answersTo("modes", this.asked({ kind, values: session.wished ?? session.answer.actuators }))) {
-      this.tell(error ?? `${modes.length} ${kind} mode${modes.length === 1 ? "" : "s"}`, !!error);
+      this.say(error ?? `${modes.length} ${kind} mode${modes.length === 1 ? "" : "s"}`, !!error);
       const buttons = (modes ?? []).map(({ words, ...mode }, k) => {
         const title = `Mode ${k + 1}, ${words}`;
         const className = words.startsWith("beyond") ? "chip beyond" : "chip";

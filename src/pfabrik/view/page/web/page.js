@@ -48,7 +48,7 @@ class Page {
     const { session } = this;
     this.scene.show(session.answer);
     this.showAsked();
-    if (!session.isTold) this.live?.note();
+    if (!session.isReported) this.live?.report();
     this.settle();
   }
 

@@ -19,16 +19,16 @@ class Player {
     this.button = $("#player button");
     this.button.onclick = () => (this.clock ? this.stop() : this.play());
     $("#player").hidden = steps.length < 2;
-    this.told();
+    this.showStep();
   }
 
   take(place) {
     this.place = place;
     this.page.session.take(this.steps[place], this.steps[place].target, "path");
-    this.told();
+    this.showStep();
   }
 
-  told() {
+  showStep() {
     this.slider.value = this.place;
     const seconds = this.steps[this.place].step * this.every;
     $("#player output").textContent = `${this.steps[this.place].step} · ${rounded(seconds, seconds < 10 ? 2 : 1)} s`;

@@ -53,7 +53,7 @@ class RemoteEngine extends StillEngine {
     super(machine);
     this.isStill = false;
     this.isRemote = true;
-    this.newest = new Newest("ask", (error) => window.page?.live?.tell(error, true));
+    this.newest = new Newest("ask", (error) => window.page?.live?.say(error, true));
   }
 
   question(make, done) {

@@ -46,7 +46,7 @@ class Session {
     this.engine.question(make, (answer, isLast) => {
       if (answer.actuators) this.start = answer;
       const target = isLast && state.asked === "actuators" ? [...answer.pose] : this.target;
-      this.settle({ answer, target, hasJumped: answer.jumped, isTold: true });
+      this.settle({ answer, target, hasJumped: answer.jumped, isReported: true });
     });
   }
 
@@ -55,7 +55,7 @@ class Session {
     this.begin(gesture);
     this.engine.newest?.drop();
     this.start = answer;
-    const nothing = { wished: null, joints: null, origin: null, hasJumped: false, isTold: false };
+    const nothing = { wished: null, joints: null, origin: null, hasJumped: false, isReported: false };
     this.settle({ target: [...target], answer, asked: "configuration", gesture, ...nothing });
   }
 
@@ -130,7 +130,7 @@ class Session {
     this.present = from.pop();
     this.engine.newest?.drop();
     this.start = this.present.answer;
-    this.settle({ ...this.present, hasJumped: false, isTold: false });
+    this.settle({ ...this.present, hasJumped: false, isReported: false });
   }
 
   /** The part of an address that keeps the target, and the branches of the legs or all joints; of home there is none. */
