@@ -255,6 +255,17 @@ def test_only_the_newest_of_what_waits_is_asked_and_a_failure_is_told() -> None:
     assert json.loads(ran.stdout) == [[0, 4, 3, 5], [[0, False], [4, True], "no", [5, True]]]
 
 
+def test_why_no_limit_holds_an_answer_back_is_a_reason(shown: Callable[..., pf.Viewer]) -> None:
+    """Both cranks of a 5-bar without limits driven outward: its forearms are too short."""
+    viewer = shown("five_bar")
+    free = viewer.mechanism.without_limits()
+    values = np.radians([60.0, -60.0])
+    answer = page_answer(pf.solve_fk(free, values))
+    state = {"asked": "actuators", "values": values.tolist(), "target": answer["pose"], "answer": answer}
+    (reason,) = [each["reason"] for each in asked(viewer, "more", free=True, **state) if "reason" in each]
+    assert "the assembly mode ends at a dead point, a parallel singularity" in reason
+
+
 def test_borders_and_singularities_are_sent_with_their_colours(shown: Callable[..., pf.Viewer]) -> None:
     """Singularities where the parallel measure is 0; the border as the workspace has it."""
     viewer = shown("five_bar")

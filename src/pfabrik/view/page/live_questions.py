@@ -70,11 +70,15 @@ class LiveQuestions:
         send(page_answer(answered(mechanism, asked)))
 
     def _more(self, mechanism: Mechanism, asked: dict[str, Any], send: Send) -> None:
-        """What is nearest to an answer: limits, other links; where the page does not know: singularities, travel."""
+        """What is nearest to an answer: limits, other links; where the page does not know: the reason why it is as it
+        is, singularities, travel.
+        """
         here = configuration_from(mechanism, asked["answer"])
         limits = limits_left(here)
         bars = [asdict(left) | {"isOn": abs(left.margin) <= TOLERANCES.active} for left in limits[:BARS]]
         send({"limits": bars, "others": max(0, len(limits) - BARS), "distance": _distance(here)})
+        if asked["answer"]["status"] == Status.PROJECTED and not asked["answer"]["limits"]:
+            send({"reason": answered(mechanism, asked).reason})
         if why_no_page(model_of(mechanism)):
             home = configuration(mechanism, home_coordinates(mechanism))
             (serial, parallel), side = nearness(here, home), side_of(here)

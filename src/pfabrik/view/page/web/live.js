@@ -61,8 +61,9 @@ class Live {
     const ways = engine.isRemote ? page.waysFrom(answer) : [];
     try {
       const asked = this.asked({ directions: ways.map(({ kind, vector }) => [kind, vector]) });
-      for await (const { error, limits, others, distance, singular, atHome, reach } of answersTo("more", asked, signal)) {
+      for await (const { error, limits, others, distance, reason, singular, atHome, reach } of answersTo("more", asked, signal)) {
         if (signal.aborted) return;
+        if (reason) page.panel.showReason(reason);
         if (error) this.say(error, true);
         if (limits) page.panel.showLimits(limits, others);
         if (distance !== undefined) page.distance = distance;

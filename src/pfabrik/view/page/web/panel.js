@@ -126,6 +126,8 @@ class Panel {
   }
 
   show() {
+    const { answer } = this.session;
+    if (answer.status !== PROJECTED || answer.limits.length) this.reason = "";
     this.showStatus();
     this.showFields();
     this.showActuators();
@@ -147,6 +149,12 @@ class Panel {
     $("#limits").replaceChildren(...chips);
   }
 
+  /** The reason of an answer that no limit holds back, from the program that serves the page. */
+  showReason(reason) {
+    this.reason = `${reason[0].toUpperCase()}${reason.slice(1)}.`;
+    this.showStatus();
+  }
+
   explanation() {
     const { answer, wished, hasJumped } = this.session;
     const has = answer.limits.length > 0;
@@ -154,6 +162,7 @@ class Panel {
     if (answer.status === REACHED) return has ? "Every limit kept; it lies on" : kept;
     if (answer.status === EXCEEDED) return "The loops close in this mode, but beyond";
     if (answer.status >= FAILED) return "The last feasible pose is shown.";
+    if (!has && this.reason) return this.reason;
     if (wished) return "These values do not fit together; this is the nearest that does.";
     const how = hasJumped ? "Nearest feasible pose, to which drives would jump," : "Nearest feasible pose,";
     return `${how} ${this.distance(answer)} short. ${has ? "Stopped by" : "Its links are stretched."}`;
