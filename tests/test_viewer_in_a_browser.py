@@ -221,9 +221,13 @@ def test_what_counts_is_in_sight(browser: Any, shown: Callable[..., pf.Viewer]) 
     """Bars of singularities on a desk and the last strut on a phone without scrolling; the ghost of a far target."""
     viewer = shown("stewart")
     page, _ = opened(browser, viewer.url, **WIDE)
-    assert page.evaluate(IN_VIEW, ["#near"])
+    for height in (800, 576):  # of a window, and of a page within another
+        page.set_viewport_size({"width": 1280, "height": height})
+        assert page.evaluate(IN_VIEW, ["#near"])
     phone, _ = opened(browser, viewer.url, **PHONE)
-    assert phone.evaluate(IN_VIEW, ["#actuators .row:last-child"])
+    for height in (844, 576):
+        phone.set_viewport_size({"width": 390, "height": height})
+        assert phone.evaluate(IN_VIEW, ["#actuators .row:last-child"])
     for each in (page, phone):
         for view in ("top", "iso"):
             each.get_by_role("button", name=view, exact=True).click()
