@@ -189,6 +189,7 @@ def test_links_that_are_nearest_are_measured_and_solids_hidden(browser: Any, sho
     ends = np.array(page.evaluate("page.distance.ends")) * length
     assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(pf.clearance(viewer.solution).distance)
     assert page.locator("#names .distance").count() == 1
+    assert page.evaluate("page.distance.shapes.length") == 2
     page.click("#solids")
     until(page, "!document.querySelector('#names .distance')")
 

@@ -13,6 +13,7 @@ from ...answers.solution import Solution
 from ...answers.status import Status
 from ...answers.words import by_bound, exceeded
 from ...capabilities.clearance.clearance import clearance
+from ...capabilities.clearance.solid_meshes import solids_of
 from ...capabilities.modes.assembly import assembly_modes
 from ...capabilities.modes.working import working_modes
 from ...configuration import configuration
@@ -127,13 +128,14 @@ def _is_same(one: Solution, other: Solution) -> bool:
 
 
 def _distance(here: Solution) -> dict[str, Any] | None:
-    """The least distance between two links, and where it is; None for a machine whose links have no shapes."""
+    """The least distance between two links, where it is, and of which; None for a machine whose links have no shapes."""
     mechanism = here.mechanism
     if not len(links_of(mechanism).pairs):
         return None
-    measured = clearance(here)
+    measured, solids = clearance(here), solids_of(mechanism, here)
     return {
+        "shapes": [number for number, solid in enumerate(solids) if solid.is_nearest],
         "ends": (np.asarray(measured.points) / mechanism.characteristic_length).tolist(),
         "distance": float(measured.distance),
-        "isHeld": bool(measured.distance <= (mechanism.clearance or 0.0)),
+        "isHeld": any(solid.is_stopped for solid in solids),
     }

@@ -142,8 +142,9 @@ class _Drawing:
         if not mechanism.shapes:
             return out
         links = links_of(mechanism)
-        for shape, joints, solid in zip(mechanism.shapes, links.joints, solids_of(mechanism, None), strict=True):
-            common = {"role": "link", "paint": PAINTS[role_of(mechanism, shape.body)], "joints": [], "isClear": True}
+        shapes = zip(mechanism.shapes, links.joints, solids_of(mechanism, None), strict=True)
+        for number, (shape, joints, solid) in enumerate(shapes):
+            common = {"role": "link", "paint": PAINTS[role_of(mechanism, shape.body)], "joints": [], "shape": number}
             if joints:
                 radius = 0.5 * shape.thickness / (THICKNESS * size_of(mechanism))
                 ends = [self.indices[name] for name in joints]

@@ -206,7 +206,7 @@ class Page {
       this.showSlice();
     });
     this.addSwitch("#solids", (isOn) => (this.scene.hidesSolids = !isOn));
-    $("#solids").hidden = !drawing.parts.some((part) => part.isClear);
+    $("#solids").hidden = !drawing.parts.some((part) => part.shape !== undefined);
     $("#show").hidden = $("#show-tab").hidden = $("#solids").hidden && !this.hasSlice;
     const isNarrow = matchMedia("(max-width: 760px)");
     const place = () => $(isNarrow.matches ? "#scroll" : "header").append($("#show"));
@@ -280,7 +280,7 @@ class Page {
     const { scene, gizmo, session, paints } = this;
     const { camera } = scene;
     const isGhost = session.answer.status === PROJECTED && !session.wished;
-    const { solids, clear } = scene.solids(paints, session.held);
+    const { solids, clear } = scene.solids(paints, session.held, this.distance);
     if (isGhost) clear.push(...scene.ghost(session.target, paints.held));
     if (this.sliceModel && !this.hidesSlice) {
       const paint = (clarity) => [...paints.platform.slice(0, 3), clarity];

@@ -67,14 +67,14 @@ class Scene {
   }
 
   /** Solids at the answer, what joints at their limits light up in another colour; and the shapes of bodies, clear. */
-  solids(paints, held) {
+  solids(paints, held, distance) {
     const [solids, clear] = [[], []];
     this.drawing.parts.forEach((part, k) => {
-      const isHeld = part.joints.some((name) => held.has(name));
-      const paint = isHeld ? paints.held : paints[part.paint];
-      if (part.isClear && this.hidesSolids) return;
-      if (part.isClear) this.addPart(clear, part, this.meshes[k], [...paint.slice(0, 3), 0.16]);
-      else this.addPart(solids, part, this.meshes[k], paint);
+      const isShape = part.shape !== undefined, isNearest = isShape && !!distance?.shapes.includes(part.shape);
+      const isHeld = part.joints.some((name) => held.has(name)) || (isNearest && distance.isHeld);
+      const paint = isHeld ? paints.held : isNearest ? paints.steel : paints[part.paint];
+      if (!isShape) this.addPart(solids, part, this.meshes[k], paint);
+      else if (!this.hidesSolids) this.addPart(clear, part, this.meshes[k], [...paint.slice(0, 3), isNearest ? 0.3 : 0.16]);
     });
     return { solids, clear };
   }
