@@ -128,7 +128,7 @@ def _is_same(one: Solution, other: Solution) -> bool:
 
 
 def _distance(here: Solution) -> dict[str, Any] | None:
-    """The least distance between two links, where it is, and of which; None for a machine whose links have no shapes."""
+    """The least distance between two links, where it is, and of which; None for a machine without shapes of links."""
     mechanism = here.mechanism
     if not len(links_of(mechanism).pairs):
         return None
