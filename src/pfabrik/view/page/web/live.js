@@ -53,12 +53,12 @@ class Live {
     this.states.ask(() => this.asked());
   }
 
-  /** What is nearest to an answer: limits, and links; the rest where the page does not know it by itself. */
+  /** What is nearest to an answer: limits, and links; the rest where the page does not know it, travel after a drag. */
   async more() {
     this.nearby?.abort();
     const { signal } = (this.nearby = new AbortController());
     const { page } = this, { engine, answer } = page.session, travel = [];
-    const ways = engine.isRemote ? page.waysFrom(answer) : [];
+    const ways = engine.isRemote && !page.gestures?.held ? page.waysFrom(answer) : [];
     try {
       const asked = this.asked({ directions: ways.map(({ kind, vector }) => [kind, vector]) });
       for await (const { error, limits, others, distance, reason, singular, atHome, reach } of answersTo("more", asked, signal)) {

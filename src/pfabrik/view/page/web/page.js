@@ -96,7 +96,7 @@ class Page {
       const marksOf = (each) => this.scene.marksOf(each);
       panel.showModes(engine.modes(from, marksOf), marksOf(answer));
     }
-    if (answer.actuators && !(engine.isRemote && this.gestures?.held)) this.live?.more();
+    if (answer.actuators) this.live?.more();
     this.later = null;
     this.delay = Math.max(MORE_AFTER, 3 * (performance.now() - began));
     if (this.gestures?.held || this.player?.clock || engine.newest?.isBusy) return;
