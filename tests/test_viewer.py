@@ -25,7 +25,7 @@ from command import pfabrik, write_files
 from machines import tripod_rps
 from pfabrik.errors import InvalidArgument
 from pfabrik.view.page import borders
-from pfabrik.view.page.distances import limits_left, nearness, side_of
+from pfabrik.view.page.distances import leg_at_dead_point, limits_left, side_of
 from pfabrik.view.page.export_web import FOLDER
 from pfabrik.view.page.page_answers import configuration_from, page_answer
 from pfabrik.view.page.watch import Watch
@@ -333,9 +333,8 @@ def test_the_leg_that_is_nearest_to_its_dead_point_is_named_and_sides_of_singula
     home = pf.solve_ik(free, free.home_pose)
     reach = 254.9
     stretched = pf.solve_ik(free, (0, -50 + reach * np.sin(0.5), reach * np.cos(0.5)), start=home)
-    serial, _ = nearness(stretched, home)
-    assert serial.leg == "p1"
-    assert serial.measure < 0.1 * serial.at_home
+    assert leg_at_dead_point(stretched) == "p1"
+    assert leg_at_dead_point(home) == ""
     height = np.sqrt(110.0**2 - (145.0 - 50.0) ** 2)  # of the elbows, 145 mm to the left and right of the tip
     above, below = (pf.solve_ik(free, (0, 0, height + offset), start=home) for offset in (20.0, -20.0))
     assert side_of(above) * side_of(below) == -1.0

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...answers.differential import singularity
 from ...answers.solution import Solution
 from ...answers.status import Status
 from ...answers.words import by_bound, exceeded
@@ -24,7 +25,7 @@ from ...machine.description.mechanism import Mechanism
 from ...tolerances import TOLERANCES
 from ...travel import travel
 from .borders import Borders
-from .distances import limits_left, nearness, side_of
+from .distances import leg_at_dead_point, limits_left, side_of
 from .page_answers import configuration_from, page_answer
 from .page_data import why_no_page
 from .server import Send
@@ -81,11 +82,8 @@ class LiveQuestions:
         if asked["answer"]["status"] == Status.PROJECTED and not asked["answer"]["limits"]:
             send({"reason": answered(mechanism, asked).reason})
         if why_no_page(model_of(mechanism)):
-            home = configuration(mechanism, home_coordinates(mechanism))
-            (serial, parallel), side = nearness(here, home), side_of(here)
-            now = {"serial": serial.measure, "parallel": parallel.measure, "leg": serial.leg, "side": side}
-            at_home = {"serial": serial.at_home, "parallel": parallel.at_home}
-            send({"singular": now, "atHome": at_home})
+            home = singularity(configuration(mechanism, home_coordinates(mechanism)))
+            send({"singular": _measures(here), "atHome": {"serial": home.serial, "parallel": home.parallel}})
             for kind, direction in asked["directions"]:
                 (reach,) = travel(here, **{kind: direction})
                 stops = [{"joint": each.joint, "bound": each.bound} for each in reach.stopped_by]
@@ -125,6 +123,12 @@ def answered(mechanism: Mechanism, asked: dict[str, Any]) -> Solution:
 
 def _is_same(one: Solution, other: Solution) -> bool:
     return one.mechanism == other.mechanism and bool(np.array_equal(one.q, other.q))
+
+
+def _measures(here: Solution) -> dict[str, Any]:
+    """How near an answer is to singularities, as the page measures it where it can."""
+    now = singularity(here)
+    return {"serial": now.serial, "parallel": now.parallel, "leg": leg_at_dead_point(here), "side": side_of(here)}
 
 
 def _distance(here: Solution) -> dict[str, Any] | None:
