@@ -100,7 +100,7 @@ $(MODULE): $(READY) $(KERNELS)
 $(STAMP): $(READY)
 	@printf 'installing what tests and checks need ' >&2
 	@(while sleep 2 && kill -0 $$$$ 2>/dev/null; do printf . >&2; done) & dots=$$!; trap 'kill $$dots' EXIT; \
-		$(PIP) --no-build-isolation --editable '.[plot,view,dev]' && echo >&2
+		$(PIP) --no-build-isolation --editable '.[plot,collide,dev]' && echo >&2
 	@# the model of a robot, which tests read from its maker's wheel: without what its programs need, and skipped without it
 	@-$(PIP) --no-deps reachy-mini reachy-mini-rust-kinematics
 	@touch $@

@@ -1,4 +1,4 @@
-"""What a motion of the mouse in the viewer costs: to solve, to send, and until the answer is in the page."""
+"""What a motion of the mouse in the viewer costs: the answer in the page, and until it is on the screen."""
 
 from __future__ import annotations
 
@@ -6,14 +6,12 @@ import os
 import shutil
 from collections.abc import Iterator
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import pfabrik as pf
 from table import Row
-from timing import best_times
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 SOFTWARE = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
@@ -21,45 +19,28 @@ SIZE = {"width": 1000, "height": 600}
 MOTIONS, PAUSE = 40, 150  # motions that are timed, and milliseconds after each
 
 WATCHED = """() => {
-    const pose = () => document.querySelector('[data-pfabrik=pose]')?.getAttribute('value')
-    let before = pose(), moved = null
     window.delays = []
+    let moved = null
     addEventListener('pointermove', () => { moved ??= performance.now() }, {capture: true})
-    new MutationObserver(() => {
-        if (pose() === before || moved === null) return
+    const show = page.session.onChange
+    page.session.onChange = () => {
+        show()
         const began = moved
-        before = pose(), moved = null
-        requestAnimationFrame(() => setTimeout(() => window.delays.push(performance.now() - began)))
-    }).observe(document.body, {subtree: true, childList: true, attributes: true})
+        moved = null
+        if (began !== null) requestAnimationFrame(() => setTimeout(() => window.delays.push(performance.now() - began)))
+    }
 }"""
-"""Notes how long after a motion of the mouse another pose has been drawn [ms]."""
+"""Notes how long after a motion of the mouse another answer has been drawn [ms]."""
 
 
 def viewer(runs: int) -> Iterator[Row]:
-    """A hexapod's target, dragged up and down within reach and beyond."""
-    if find_spec("viser") is None:
-        return
-    machine = pf.load("stewart")
-    with pf.view(machine, port=18280) as shown:
-        targets = [pf.pose((0.0, 0.0, z)) for z in np.linspace(150.0, 290.0, 50)]
-
-        def solve() -> None:
-            for target in targets:
-                shown._stage.session.go_to(target)
-
-        def solve_and_send() -> None:
-            for target in targets:
-                shown._answer(lambda stage, target=target: stage.session.go_to(target))
-
-        solving, sending = best_times(runs, solve, solve_and_send)
-        shown.show(pf.solve_ik(machine, machine.home_pose))
-        n = len(targets)
-        yield Row("viewer, 6-UPS: a motion, solved", n, solving / n)
-        yield Row("viewer, 6-UPS: a motion, solved and sent", n, sending / n)
-        delays = in_a_browser(shown)
+    """A hexapod's target, and that of an arm that Python answers for, dragged up and down."""
+    for name, label in (("stewart", "6-UPS"), ("panda", "7-R arm, answered by Python")):
+        with pf.view(name, port=18280) as shown:
+            delays = in_a_browser(shown)
         if len(delays):
-            yield Row("viewer, 6-UPS: mouse to answer on the screen, median", 1, float(np.median(delays)))
-            yield Row("viewer, 6-UPS: the same, longest but for a tenth", 1, float(np.quantile(delays, 0.9)))
+            yield Row(f"viewer, {label}: mouse to answer on the screen, median", 1, float(np.median(delays)))
+            yield Row(f"viewer, {label}: the same, longest but for a tenth", 1, float(np.quantile(delays, 0.9)))
 
 
 def in_a_browser(shown: pf.Viewer) -> NDArray[np.float64]:
@@ -73,38 +54,15 @@ def in_a_browser(shown: pf.Viewer) -> NDArray[np.float64]:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=[*SOFTWARE, *sandbox])
         page = browser.new_page(viewport=SIZE)
-        page.set_default_timeout(60_000)
         page.goto(shown.url)
-        page.locator("[data-pfabrik=pose]").wait_for()
-        page.wait_for_timeout(3000)
-        across, down = caught(shown, page)
+        page.locator("#travel .travel").first.wait_for()
+        across, down = page.evaluate("page.scene.camera.look().onScreen(page.gizmo.centre)")
         page.evaluate(WATCHED)
+        page.mouse.move(across, down)
+        page.mouse.down()
         for motion in range(1, MOTIONS + 1):
             page.mouse.move(across, down + 60.0 * np.sin(0.3 * motion))
             page.wait_for_timeout(PAUSE)
-        delays = page.evaluate("() => window.delays")
+        delays = page.evaluate("window.delays")
         browser.close()
     return 1e-3 * np.array(delays)
-
-
-def caught(shown: pf.Viewer, page: Any) -> tuple[float, float]:
-    """Where the mouse has hold of the upright arrow [pixels]."""
-    from scipy.spatial.transform import Rotation
-
-    home = shown.target[:3, 3].copy()
-    point = home / shown.mechanism.characteristic_length + [0.0, 0.0, 0.3]
-    for _ in range(20):
-        (client,) = shown._server.get_clients().values()
-        camera = client.camera
-        seen = Rotation.from_quat(np.roll(camera.wxyz, -1)).inv().apply(point - camera.position)
-        focal = 0.5 * camera.image_height / np.tan(0.5 * camera.fov)
-        across, down = focal * seen[:2] / seen[2] + 0.5 * np.array([camera.image_width, camera.image_height])
-        page.mouse.move(across, down)
-        page.wait_for_timeout(500)
-        page.mouse.down()
-        page.mouse.move(across, down + 5)
-        page.wait_for_timeout(1000)
-        if not np.array_equal(shown.target[:3, 3], home):
-            return float(across), float(down)
-        page.mouse.up()
-    raise RuntimeError("the handle was not caught")

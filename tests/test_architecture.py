@@ -177,7 +177,7 @@ def loaded_by(heavy: str, lines: list[list[str]]) -> tuple[list[tuple[int | None
     return [tuple(each) for each in json.loads(told)], said
 
 
-HEAVY = "numpy scipy matplotlib rich mujoco viser trimesh yaml"
+HEAVY = "numpy scipy matplotlib mujoco trimesh yaml http.server"
 HELP = [["--help"], *[[command, "--help"] for command in main.subcommands]]
 WRONG = [
     ["chek"],
@@ -228,7 +228,7 @@ def test_no_command_loads_what_it_does_not_use(tmp_path: Path) -> None:
         ],
     }
     lines = [line for group in groups.values() for line in group]
-    told, _ = loaded_by("numpy matplotlib rich mujoco viser trimesh", lines)
+    told, _ = loaded_by("numpy matplotlib mujoco trimesh http.server", lines)
     assert [loaded for _, loaded in told[1:]] == [names.split() for names, group in groups.items() for _ in group]
     assert [code for code, _ in told[1:]] == [0] * len(lines)
 

@@ -31,7 +31,6 @@ from pfabrik.common.rotations import to_rpy
 from pfabrik.exchange.export.rod_lengths import uneven_rods
 from pfabrik.machine.catalog import description, template, templates
 from pfabrik.machine.files import loads
-from pfabrik.view.live.viewer import Viewer
 from test_calibration import klipper_settings
 
 pytestmark = pytest.mark.usefixtures("folder")
@@ -595,7 +594,7 @@ def test_examples_of_the_help_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     """In the order of the help, one after the other: what one writes another may read."""
     for needed in ("matplotlib", "mujoco"):
         pytest.importorskip(needed)
-    monkeypatch.setattr(Viewer, "wait", lambda _: None)
+    monkeypatch.setattr(pf.Viewer, "wait", lambda _: None)
     monkeypatch.setattr("webbrowser.open", lambda _: None)
     Path("printer.cfg").write_text(klipper_settings(), encoding="utf-8")
     Path("robot.xml").write_text(pf.interop.to_mjcf(STEWART), encoding="utf-8")

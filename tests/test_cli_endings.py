@@ -103,7 +103,6 @@ def test_a_track_that_is_told_to_end_leaves_no_parts_of_files(folder: Path) -> N
 @pytest.mark.compiled
 @pytest.mark.parametrize("after", [1.5, 3.0])
 def test_a_view_is_interrupted_at_any_moment(after: float) -> None:
-    pytest.importorskip("viser")
     at = time.monotonic() + after
     line = f"view stewart --no-browser --port {9100 + int(10 * after)}"
     code, said = stopped(line, signal.SIGINT, lambda: time.monotonic() >= at)

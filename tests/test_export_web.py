@@ -26,7 +26,8 @@ from pfabrik.common.memory_image import packed
 from pfabrik.common.rotations import from_rotvec
 from pfabrik.errors import InvalidArgument
 from pfabrik.machine.model import model_of
-from pfabrik.view.page.export_web import FOLDER, SCRIPTS, machine_data, web_page
+from pfabrik.view.page.export_web import FOLDER, SCRIPTS, web_page
+from pfabrik.view.page.page_data import page_data
 
 NODE = shutil.which("node")
 needs_node = pytest.mark.skipif(NODE is None, reason="needs Node.js, which is not installed")
@@ -62,7 +63,7 @@ MANY = [name for name in MACHINES if name not in FEW]
 def targets_of(machine: pf.Mechanism, n: int, seed: int) -> Any:
     """Poses about home, near and far, within the freedoms that the machine has."""
     rng, task, length = np.random.default_rng(seed), model_of(machine).task, machine.characteristic_length
-    data = machine_data(model_of(machine))["task"]
+    data = page_data(machine)["task"]
     targets = np.repeat(machine.home_pose[None], n, axis=0)
     moves = np.isin(np.arange(3), data["slides"])
     turns = np.isin(np.arange(3), data["turns"]) if task.rotations else np.zeros(3, bool)
@@ -99,7 +100,7 @@ def loaded(name: str) -> pf.Mechanism:
 def edges_of(machine: pf.Mechanism) -> Any:
     """Targets far beyond reach, along the axes of the task, both ways."""
     length, home = machine.characteristic_length, machine.home_pose
-    slides = machine_data(model_of(machine))["task"]["slides"]
+    slides = page_data(machine)["task"]["slides"]
     targets = np.repeat(home[None], 2 * len(slides), axis=0)
     for k, axis in enumerate(slides):
         for sign in (0, 1):
@@ -138,7 +139,7 @@ def ask(name: str, targets: Any, **more: Any) -> dict[str, Any]:
     """What the page of a machine answers to targets, and to more."""
     question = {
         "kernels": packed((FOLDER / "kernels.wasm").read_bytes()),
-        "machine": machine_data(model_of(loaded(name))),
+        "machine": page_data(loaded(name)),
         "targets": targets.reshape(-1, 16).tolist(),
         "listed": targets_of(loaded(name), 1, 5).ravel().tolist(),
         "link": link_to(loaded(name).home_pose),
@@ -254,6 +255,24 @@ def test_modes_keep_the_numbers_of_the_library_s_list_from_each_of_them(name: st
         assert [mode["status"] for mode in modes] == [int(mode.status) for mode in expected]
         for mode, other in zip(modes, expected, strict=True):
             assert np.cos(mode["actuators"]) == pytest.approx(np.cos(other.actuators), abs=NEAR)
+
+
+@needs_node
+def test_the_border_of_a_slice_is_as_round_as_the_workspace() -> None:
+    """Of a ring over a grid of 40 cells: each point of the border is on a circle to a 100th of a cell."""
+    scripts = [(FOLDER / "web" / f"{name}.js").read_text(encoding="utf-8") for name in ("vectors", "slice")]
+    ask = """
+    const ring = (x, y) => Math.hypot(x - 0.31, y + 0.17) < 1.5 && Math.hypot(x - 0.31, y + 0.17) > 0.6;
+    const { area, border } = areaOf(ring, [[-2, 2], [-2, 2]], 41, 0);
+    console.log(JSON.stringify([area, border]));
+    """
+    ran = subprocess.run([str(NODE), "-"], input="\n".join([*scripts, ask]), capture_output=True, text=True, check=True)
+    area, border = (np.reshape(each, (-1, 3, 6))[..., :2] for each in json.loads(ran.stdout))
+    far = np.linalg.norm(border.reshape(-1, 2) - [0.31, -0.17], axis=1)
+    assert np.minimum(np.abs(far - 1.5), np.abs(far - 0.6)).max() < 1e-3
+    (u, v) = np.moveaxis(np.diff(area, axis=1), 1, 0)
+    spanned = 0.5 * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum()
+    assert spanned == pytest.approx(np.pi * (1.5**2 - 0.6**2), rel=3e-3)
 
 
 @pytest.mark.parametrize("name", MACHINES)

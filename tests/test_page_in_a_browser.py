@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,51 +10,55 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
-from in_chromium import MARKS, PATIENCE, chromium
+from in_chromium import MARKS, centre, chromium, opened, target, until
 
 pytestmark = MARKS
+ALONE, SERVED = "alone", "served"
+BOTH = pytest.mark.parametrize("form", [ALONE, SERVED])
 SIZE = {"width": 900, "height": 500}
+DESK = {"viewport": SIZE}
 PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 FOLLOWS = 0.5  # of a millimetre: a pixel is larger
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def started() -> Iterator[Any]:
     yield from chromium()
 
 
+@pytest.fixture
+def browser(started: Any) -> Iterator[Any]:
+    """The browser, whose pages are closed in the end."""
+    yield started
+    for context in started.contexts:
+        context.close()
+
+
 @pytest.fixture(scope="module")
-def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("pages")
-    for name in ("stewart", "five_bar"):
-        pf.export_web(pf.load(name), folder / f"{name}.html")
-    return folder
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., str]]:
+    """The address of a machine's page, as a file alone or as a program serves it."""
+    folder, addresses, viewers = tmp_path_factory.mktemp("pages"), dict[Any, str](), list[pf.Viewer]()
+
+    def find(machine: pf.Mechanism, form: str = ALONE) -> str:
+        if (machine, form) not in addresses and form == ALONE:
+            file = folder / f"{len(addresses)}.html"
+            pf.export_web(machine, file)
+            addresses[machine, form] = file.as_uri()
+        elif (machine, form) not in addresses:
+            viewers.append(pf.view(machine, port=18180))
+            addresses[machine, form] = viewers[-1].url
+        return addresses[machine, form]
+
+    yield find
+    for viewer in viewers:
+        viewer.close()
 
 
-def opened(browser: Any, file: Path, link: str = "", **options: Any) -> tuple[Any, list[str]]:
-    """A page without a network, and its errors and what it asks for from elsewhere."""
-    context = browser.new_context(offline=True, **({"viewport": SIZE} | options))
-    page, faults = context.new_page(), list[str]()
-    page.set_default_timeout(PATIENCE)
-    page.on("pageerror", lambda error: faults.append(str(error)))
-    page.on("request", lambda request: faults.extend([request.url] * request.url.startswith(("http", "ws"))))
-    page.goto(file.as_uri() + link)
-    page.wait_for_function("window.page?.shown")
-    return page, faults
-
-
-def target(page: Any) -> Any:
-    return np.reshape(page.evaluate("page.session.target"), (4, 4))
-
-
-def centre(page: Any) -> list[float]:
-    """Where the handles are on the screen."""
-    found: list[float] = page.evaluate("page.scene.camera.look().onScreen(page.gizmo.centre)")
-    return found
-
-
-def test_the_platform_follows_the_mouse_and_what_stops_it_is_named(browser: Any, pages: Path) -> None:
-    page, faults = opened(browser, pages / "stewart.html")
+@BOTH
+def test_the_platform_follows_the_mouse_and_what_stops_it_is_named(
+    browser: Any, address: Callable[..., str], form: str
+) -> None:
+    page, faults = opened(browser, address(pf.load("stewart"), form), draws=True, **DESK)
     x, y = centre(page)
     page.mouse.move(x, y)
     page.mouse.down()
@@ -70,18 +74,19 @@ def test_the_platform_follows_the_mouse_and_what_stops_it_is_named(browser: Any,
     assert not faults
 
 
-def test_a_link_opens_at_the_pose_that_it_was_copied_at(browser: Any, pages: Path) -> None:
-    page, _ = opened(browser, pages / "stewart.html", "#p=10,-20,200,5,0,10")
+@BOTH
+def test_a_link_opens_at_the_pose_that_it_was_copied_at(browser: Any, address: Callable[..., str], form: str) -> None:
+    page, _ = opened(browser, address(pf.load("stewart"), form) + "#p=10,-20,200,5,0,10", **DESK)
     page.locator("canvas").press("ArrowRight")
-    page.wait_for_function("page.session.past.length === 1")
-    again, _ = opened(browser, pages / "stewart.html", page.evaluate("location.hash"))
+    until(page, "page.session.past.length === 1")
+    again, _ = opened(browser, page.evaluate("location.href"), **DESK)
     assert target(again) == pytest.approx(target(page), abs=1e-6)
     page.keyboard.press("Control+z")
     assert target(page)[:3, 3] == pytest.approx([10.0, -20.0, 200.0], abs=1e-6)
 
 
-def test_a_slider_drives_an_actuator(browser: Any, pages: Path) -> None:
-    page, _ = opened(browser, pages / "five_bar.html")
+def test_a_slider_drives_an_actuator(browser: Any, address: Callable[..., str]) -> None:
+    page, _ = opened(browser, address(pf.load("five_bar")), **DESK)
     slider = page.locator("#actuators input").first
     slider.focus()
     for _ in range(3):
@@ -90,20 +95,23 @@ def test_a_slider_drives_an_actuator(browser: Any, pages: Path) -> None:
     expected = pf.solve_fk(machine, page.evaluate("page.session.answer.actuators"))
     assert np.reshape(page.evaluate("page.session.answer.pose"), (4, 4)) == pytest.approx(expected.pose, abs=1e-6)
     assert page.evaluate("page.session.answer.actuators[0]") > machine.drives[0].home
+    until(page, "!page.later && page.session.past.length > 0")
+    page.locator("#undo").click()  # a slider that goes on without a pause makes one step
+    assert target(page) == pytest.approx(machine.home_pose)
+    assert page.locator("#fields input").evaluate_all("(all) => all.map((each) => each.ariaLabel)") == ["y", "z"]
 
 
 def test_a_drag_through_a_parallel_singularity_keeps_its_mode_and_the_page_says_that_it_passed(
-    browser: Any, pages: Path
+    browser: Any, address: Callable[..., str]
 ) -> None:
-    pf.export_web(pf.load("five_bar").without_limits(), pages / "free.html")
-    page, faults = opened(browser, pages / "free.html")
+    page, faults = opened(browser, address(pf.load("five_bar").without_limits()), **DESK)
     x, y = centre(page)
     shares, mode = [], page.evaluate("page.session.mode")
     page.mouse.move(x, y)
     page.mouse.down()
     for down in range(8, 130, 8):
         page.mouse.move(x, y + down)
-        page.wait_for_function("!page.later")
+        until(page, "!page.later")
         shares.append(int(page.locator("#near output").last.text_content().split()[0]))
         if len(shares) == 1:
             assert not page.locator("#crossing").inner_text()
@@ -116,26 +124,29 @@ def test_a_drag_through_a_parallel_singularity_keeps_its_mode_and_the_page_says_
     assert "passed a parallel singularity" in page.locator("#crossing").inner_text()
     assert page.evaluate("page.session.mode") == mode
     page.locator("#home").click()
-    page.wait_for_function("!page.later")
+    until(page, "!page.later")
     assert not page.locator("#crossing").inner_text()
     assert not faults
 
 
-def test_buttons_of_modes_keep_their_numbers(browser: Any, pages: Path) -> None:
-    page, _ = opened(browser, pages / "five_bar.html", "#p=0,10,180,0,0,0")
+def test_buttons_of_modes_keep_their_numbers(browser: Any, address: Callable[..., str]) -> None:
+    page, _ = opened(browser, address(pf.load("five_bar")) + "#p=0,10,180,0,0,0", **DESK)
     expected = pf.working_modes(pf.load("five_bar"), [0.0, 10.0, 180.0])
-    page.wait_for_function("document.querySelectorAll('#modes button').length === 4")
+    until(page, "document.querySelectorAll('#modes > h2 + div button').length === 4")
     for number in (3, 2, 4, 1):
-        page.evaluate(f"document.querySelectorAll('#modes button')[{number - 1}].click()")
-        page.wait_for_function("!page.later")
-        lit = page.evaluate("[...document.querySelectorAll('#modes button')].map((each) => each.ariaPressed)")
+        page.evaluate(f"document.querySelectorAll('#modes > h2 + div button')[{number - 1}].click()")
+        until(page, "!page.later")
+        lit = page.evaluate(
+            "[...document.querySelectorAll('#modes > h2 + div button')].map((each) => each.ariaPressed)"
+        )
         assert [k + 1 for k, each in enumerate(lit) if each == "true"] == [number]
         actuators = page.evaluate("page.session.answer.actuators")
         assert np.cos(actuators) == pytest.approx(np.cos(expected[number - 1].actuators), abs=1e-6)
 
 
-def test_a_finger_drags_on_a_phone(browser: Any, pages: Path) -> None:
-    page, faults = opened(browser, pages / "five_bar.html", **PHONE)
+@BOTH
+def test_a_finger_drags_on_a_phone(browser: Any, address: Callable[..., str], form: str) -> None:
+    page, faults = opened(browser, address(pf.load("five_bar"), form), **PHONE)
     x, y = centre(page)
     before, touch = target(page), page.context.new_cdp_session(page)
     for kind, points in (("Start", [[x, y]]), ("Move", [[x + 30, y + 30]]), ("End", [])):
@@ -146,11 +157,15 @@ def test_a_finger_drags_on_a_phone(browser: Any, pages: Path) -> None:
     assert not faults
 
 
-def test_within_another_page_it_takes_that_page_s_theme_and_leaves_it_the_wheel(browser: Any, pages: Path) -> None:
+def test_within_another_page_it_takes_that_page_s_theme_and_leaves_it_the_wheel(
+    browser: Any, address: Callable[..., str], tmp_path: Path
+) -> None:
     """Until it was clicked on: then the wheel zooms."""
-    (pages / "around.html").write_text('<!doctype html><iframe src="five_bar.html" width="800" height="400"></iframe>')
+    around_it = tmp_path / "around.html"
+    inside = address(pf.load("five_bar"))
+    around_it.write_text(f'<!doctype html><iframe src="{inside}" width="800" height="400"></iframe>')
     around = browser.new_page(viewport=SIZE)
-    around.goto((pages / "around.html").as_uri())
+    around.goto(around_it.as_uri())
     (frame,) = around.frames[1:]
     frame.wait_for_function("window.page?.shown")
     for theme in ("dark", "light"):

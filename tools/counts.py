@@ -57,7 +57,7 @@ IDEAS = {
     "implementations of the legs' formulas": (
         "kernels.legs.rods.place_rod exchange.export.tensor_tables.TensorMachine paper.geometric.struts tests.oracles"
     ),
-    "viewers": "view.live.viewer.Viewer view.page.export_web.export_web",
+    "viewers": "view.page.export_web.web_page",
     "searches for the border of a workspace": (
         "capabilities.workspace.border_search.searched capabilities.workspace.border_search.sliced"
     ),

@@ -149,10 +149,10 @@ from .track import track as track
 from .travel import Travel as Travel
 from .travel import travel as travel
 from .view.animation import animate as animate
-from .view.live.viewer import Viewer as Viewer
-from .view.live.viewer import view as view
 from .view.machine import plot as plot
 from .view.page.export_web import export_web as export_web
+from .view.page.viewer import Viewer as Viewer
+from .view.page.viewer import view as view
 from .view.plot_track import plot_track as plot_track
 from .view.plot_travel import plot_travel as plot_travel
 

@@ -157,10 +157,9 @@ def stage(name: str, site: Path) -> str:
     except InvalidArgument:
         return f"""![{title(name)} at home](../pictures/{name}.png)
 
-A page cannot answer for this machine, whose chains have no closed form. The viewer can:
+A page cannot answer for this machine, whose chains have no closed form. The viewer, where the program answers, can:
 
 ```
-pip install ".[view]"
 pfabrik view {name}
 ```"""
     size = round(file.stat().st_size / 1000)

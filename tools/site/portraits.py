@@ -39,7 +39,12 @@ WITHOUT_GROUND = """() => {
 }"""
 SEEN = "() => new Promise((go) => { page.redraw(); requestAnimationFrame(() => requestAnimationFrame(go)); })"
 """Waits until the machine is drawn."""
-WITHOUT_HANDLES = "() => { page.gizmo.handles = () => []; page.hidesSlice = true; page.adapt = () => {}; }"
+WITHOUT_HANDLES = """() => {
+  page.gizmo.handles = () => [];
+  page.hidesSlice = true;
+  page.adapt = page.keepInView = () => {};
+  page.scene.camera.reset();
+}"""
 
 
 def main() -> None:

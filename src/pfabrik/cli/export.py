@@ -49,9 +49,9 @@ def text_of(
 
         return str(getattr(firmware_settings, form)(mechanism))
     if form == "web":
-        from ..view.page.export_web import web_page
+        from ..view.page.export_web import exported_page
 
-        return web_page(mechanism)
+        return exported_page(mechanism)
     if form in BACKENDS:
         from ..exchange.export.tensors import TASK, tensor_source
 

@@ -1,4 +1,4 @@
-"""Pictures, which need the extra ``plot``, and the viewer in the browser, which needs the extra ``view``."""
+"""Pictures, which need the extra ``plot``, and a page for the browser, alone or served."""
 
 from collections.abc import Callable
 from importlib import import_module

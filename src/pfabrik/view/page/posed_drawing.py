@@ -8,7 +8,7 @@ import numpy as np
 
 from ...capabilities.clearance.solid_meshes import solids_of
 from ...common.arrays import Floats
-from ...kinematics import Model, links_of, plane_of
+from ...kinematics import links_of, plane_of
 from ...machine.common_centre import common_centre
 from ...machine.description.mechanism import Joint, Mechanism
 from ...machine.description.sketch import joint_places, joints_on
@@ -28,12 +28,17 @@ PAINTS = {"base": "base", "platform": "platform", "link": "link"}
 class _Drawing:
     """Points and frames by their indices, as they are needed."""
 
-    def __init__(self, model: Model) -> None:
-        self.mechanism, self.length = model.mechanism, model.length
+    def __init__(self, mechanism: Mechanism, answers_itself: bool) -> None:
+        self.mechanism, self.length = mechanism, mechanism.characteristic_length
         self.home = joint_places(self.mechanism, None, self.mechanism.home_pose[:3, 3])
-        moved = MovedBodies(self.mechanism)
-        self.bodies = {body: moved.number(body) for body in self.mechanism.bodies if moved.is_placed(body)}
-        self.frames = [[each.on, [each.column, each.sign, *each.screw(self.length)]] for each in moved.motions]
+        self.bodies = {body: k for k, body in enumerate(_first_bodies(mechanism))}
+        self.frames: list[list[Any]] = []
+        if not answers_itself:
+            self.bodies |= {body: 2 + k for k, body in enumerate(other_bodies(mechanism))}
+        else:
+            moved = MovedBodies(mechanism)
+            self.bodies = {body: moved.number(body) for body in mechanism.bodies if moved.is_placed(body)}
+            self.frames = [[each.on, [each.column, each.sign, *each.screw(self.length)]] for each in moved.motions]
         self.points: list[dict[str, Any]] = []
         self.indices: dict[Any, int] = {}
         for joint in sorted(self.mechanism.joints, key=lambda joint: joint.at is None):
@@ -111,8 +116,9 @@ class _Drawing:
         if not mechanism.shapes:
             return out
         links = links_of(mechanism)
-        for shape, joints, solid in zip(mechanism.shapes, links.joints, solids_of(mechanism, None), strict=True):
-            common = {"role": "link", "paint": PAINTS[role_of(mechanism, shape.body)], "joints": [], "isClear": True}
+        shapes = zip(mechanism.shapes, links.joints, solids_of(mechanism, None), strict=True)
+        for number, (shape, joints, solid) in enumerate(shapes):
+            common = {"role": "link", "paint": PAINTS[role_of(mechanism, shape.body)], "joints": [], "shape": number}
             if joints:
                 radius = 0.5 * shape.thickness / (THICKNESS * size_of(mechanism))
                 ends = [self.indices[name] for name in joints]
@@ -131,9 +137,25 @@ def _normal(points: list[Floats]) -> Floats:
     return np.asarray(normal if normal[2] >= 0.0 else -normal)
 
 
-def drawing_of(model: Model, box: Floats) -> dict[str, Any]:
-    """The drawing as data, lengths in L; `box` holds the lowest and highest positions of the end effector [length]."""
-    mechanism, drawing = model.mechanism, _Drawing(model)
+def _first_bodies(mechanism: Mechanism) -> list[str]:
+    """The base, and the platform where the end effector is a body."""
+    return [mechanism.base] + [mechanism.end_effector_body] * (not mechanism.end_effector_is_joint)
+
+
+def other_bodies(mechanism: Mechanism) -> list[str]:
+    """All bodies beside base and platform, in the order of the frames that an answer of Python's has."""
+    return [body for body in mechanism.bodies if body not in _first_bodies(mechanism)]
+
+
+def drawing_of(mechanism: Mechanism, answers_itself: bool, box: Floats) -> dict[str, Any]:
+    """The drawing as data, lengths in L.
+
+    Parameters
+    ----------
+    answers_itself : the page places bodies itself; else answers bring the frames of all of them.
+    box : lowest and highest positions of the end effector [length].
+    """
+    drawing = _Drawing(mechanism, answers_itself)
     parts = [drawing.part(part) for part in parts_of(mechanism)]
     end = joints_on(mechanism, mechanism.end_effector) or [mechanism.end_effector]
     plane = plane_of(mechanism)
@@ -144,7 +166,7 @@ def drawing_of(model: Model, box: Floats) -> dict[str, Any]:
         "platform": [drawing.indices[name] for name in end],
         "end": drawing.bodies.get(mechanism.end_effector_body, 1),
         "normal": None if plane is None else np.cross(*plane).tolist(),
-        "thickness": THICKNESS * size_of(mechanism) / model.length,
+        "thickness": THICKNESS * size_of(mechanism) / mechanism.characteristic_length,
         **_view(mechanism, plane, box),
     }
 

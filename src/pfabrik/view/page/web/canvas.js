@@ -1,5 +1,5 @@
 // Drawing in WebGL 2: one program for everything that is seen, and the sun's depth map for shadows.
-const SURFACE = 0, FLAT = 1, GROUND = 2, SLICE = 3, HANDLE = 4;
+const SURFACE = 0, FLAT = 1, GROUND = 2, HANDLE = 3;
 const SHADOW_SIZE = 2048;
 
 const VERTEX = `#version 300 es
@@ -9,9 +9,7 @@ uniform mat4 model, view, light;
 uniform mat3 turned;
 out vec3 at, n;
 out vec4 lit;
-out vec2 uv;
 void main() {
-  uv = place.xy * .5 + .5;
   vec4 p = model * vec4(place, 1.);
   at = p.xyz;
   n = turned * normal;
@@ -24,15 +22,13 @@ precision highp float;
 precision highp sampler2DShadow;
 in vec3 at, n;
 in vec4 lit;
-in vec2 uv;
 out vec4 colour;
 uniform vec4 paint;
 uniform vec3 eye, sun, sky, soil, middle;
-uniform float gloss, radius, shade, texel;
+uniform float gloss, radius, shade;
 uniform int kind;
 uniform bool soft;
 uniform sampler2DShadow depths;
-uniform sampler2D slice;
 
 float sunlight() {
   vec3 p = lit.xyz / lit.w * .5 + .5;
@@ -62,20 +58,9 @@ void ground() {
   colour = vec4(mix(vec3(0.), paint.rgb, grid * (1. - dark)), fade * max(grid * paint.a, dark * shade));
 }
 
-void area() {
-  float sum = 0.;
-  for (int i = -1; i <= 1; i++)
-    for (int j = -1; j <= 1; j++)
-      sum += texture(slice, uv + vec2(i, j) * texel).r * float((2 - abs(i)) * (2 - abs(j)));
-  float v = sum / 16., w = fwidth(v) + .02, edge = 1. - smoothstep(0., 1.7 * w, abs(v - .5));
-  colour = vec4(paint.rgb, paint.a * (smoothstep(.5 - w, .5 + w, v) + 3.2 * edge));
-  if (colour.a < .004) discard;
-}
-
 void main() {
   if (kind == ${FLAT}) colour = paint;
   else if (kind == ${GROUND}) ground();
-  else if (kind == ${SLICE}) area();
   else surface();
   if (kind == ${HANDLE} && dot(at - middle, eye - middle) < -.001) colour.a *= .22;
 }`;
@@ -97,8 +82,6 @@ class Canvas {
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, this.depths, 0);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.uniform1i(this.at("depths"), 0);
-    gl.uniform1i(this.at("slice"), 1);
-    this.setSlice(new Uint8Array(4), 2);
   }
 
   linked(...texts) {
@@ -133,32 +116,30 @@ class Canvas {
     return texture;
   }
 
-  /** Which cells of a square are reached, 255 or 0 each. */
-  setSlice(cells, size) {
-    const { gl } = this;
-    gl.activeTexture(gl.TEXTURE1);
-    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    gl.deleteTexture(this.slice ?? null);
-    this.slice = this.texture(gl.R8, size, gl.RED, gl.UNSIGNED_BYTE, cells);
-    gl.activeTexture(gl.TEXTURE0);
-    gl.uniform1f(this.at("texel"), 1 / size);
-  }
-
   /** The array of a mesh on the graphics chip, and its number of corners. */
   mesh(data) {
     const { gl, meshes } = this;
     if (!meshes.has(data)) {
-      const array = gl.createVertexArray();
+      const [array, buffer] = [gl.createVertexArray(), gl.createBuffer()];
       gl.bindVertexArray(array);
-      gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(data), gl.STATIC_DRAW);
       for (const k of [0, 1]) {
         gl.enableVertexAttribArray(k);
         gl.vertexAttribPointer(k, 3, gl.FLOAT, false, 24, 12 * k);
       }
-      meshes.set(data, [array, data.length / 6]);
+      meshes.set(data, [array, data.length / 6, buffer]);
     }
     return meshes.get(data);
+  }
+
+  /** Free the memory of a mesh that is drawn no more. */
+  forget(data) {
+    const [array, , buffer] = this.meshes.get(data) ?? [];
+    if (!array) return;
+    this.gl.deleteVertexArray(array);
+    this.gl.deleteBuffer(buffer);
+    this.meshes.delete(data);
   }
 
   draw({ mesh, model, paint, kind = SURFACE, gloss = 0.25 }, as = kind) {

@@ -175,10 +175,8 @@ class Engine {
     return on;
   }
 
-  /** The axes of the task, along and about which the end effector moves. */
   get axes() {
-    const { task } = this.machine;
-    return [...task.slides.map((axis) => ["along", axis]), ...task.turns.map((axis) => ["about", axis])];
+    return axesOf(this.machine.task);
   }
 
   // An answer that legs reach again. Where links are stretched out, rounding decides if they do: then it is one within
@@ -267,17 +265,27 @@ class Engine {
     }));
   }
 
-  /** Which points of a grid along two axes legs reach at an answer's orientation, in its mode: 255 or 0 each. */
-  slice(from, [u, v], sides, count) {
-    const out = new Uint8Array(count * count);
+  /** A test for points along two axes [length]: if legs reach them at an answer's orientation, in its mode. */
+  reachTest(from, [u, v]) {
     this.solve(from.pose, from, { last: BY_LEGS });
-    const value = ([low, high], k) => low + ((high - low) * k) / (count - 1);
-    for (let j = 0; j < count; j++)
-      for (let i = 0; i < count; i++) {
-        this.target[4 * u + 3] = value(sides[0], i);
-        this.target[4 * v + 3] = value(sides[1], j);
-        if (this.call("answer_row", "target") === REACHED) out[j * count + i] = 255;
-      }
-    return out;
+    return (x, y) => {
+      this.target[4 * u + 3] = x;
+      this.target[4 * v + 3] = y;
+      return this.call("answer_row", "target") === REACHED;
+    };
+  }
+}
+
+/** The axes of a task, along and about which the end effector moves. */
+const axesOf = (task) => [...task.slides.map((axis) => ["along", axis]), ...task.turns.map((axis) => ["about", axis])];
+
+/** No answers but those that the page was written with. */
+class StillEngine {
+  constructor(machine) {
+    Object.assign(this, { machine, isStill: true, home: received(machine.homeAnswer) });
+  }
+
+  get axes() {
+    return axesOf(this.machine.task);
   }
 }

@@ -45,7 +45,7 @@ class Gestures {
     pointers.set(event.pointerId, place);
     const [x, y] = [place[0] - last[0], place[1] - last[1]];
     if (pointers.size > 1) this.pinch();
-    else if (held) return page.session.ask(page.gizmo.drag(held, ...place));
+    else if (held) return page.session.ask(page.gizmo.drag(held, ...place), { gesture: held });
     else if (event.shiftKey || event.buttons === 2) page.scene.camera.pan(x, y, this.canvas.clientHeight);
     else page.scene.camera.orbit(x, y);
     return page.redraw();

@@ -34,6 +34,7 @@ class Gizmo {
   }
 
   handles(paints) {
+    if (this.isStill) return [];
     const { size, hot } = this;
     const out = this.parts.map((part) => {
       const isHot = hot === part;
@@ -52,12 +53,13 @@ class Gizmo {
 
   /** The letters at the tips of arrows: text, place and axis. */
   get letters() {
-    const tips = this.parts.filter((part) => part.kind === "along");
+    const tips = this.isStill ? [] : this.parts.filter((part) => part.kind === "along");
     return tips.map((part) => ["xyz"[part.axis], plus(this.centre, scaled(this.axis(part), 1.13 * this.size)), part.axis]);
   }
 
   /** The handle at a point of the screen, or the platform itself; null where there is none within so many pixels. */
   pick(x, y, slack) {
+    if (this.isStill) return null;
     const { camera } = this.scene;
     let [best, least] = [null, slack];
     const offer = (part, distance) => {

@@ -110,13 +110,29 @@ function hullOf(points) {
 }
 
 /** Flat faces of a solid: its vertices three numbers each, and three indices a triangle. */
-function faceted(vertices, faces) {
+const faceted = (vertices, faces) => trianglesOf(faces.map((k) => vertices.slice(3 * k, 3 * k + 3)));
+
+/** Flat triangles: three points each. */
+function trianglesOf(points) {
   const out = [];
-  const vertex = (k) => vertices.slice(3 * k, 3 * k + 3);
-  for (let k = 0; k < faces.length; k += 3) {
-    const corners = [0, 1, 2].map((i) => vertex(faces[k + i]));
-    const normal = unit(cross(minus(corners[1], corners[0]), minus(corners[2], corners[0])));
-    for (const corner of corners) out.push(...corner, ...normal);
+  for (let k = 0; k + 2 < points.length; k += 3) {
+    const normal = unit(cross(minus(points[k + 1], points[k]), minus(points[k + 2], points[k])));
+    for (const corner of points.slice(k, k + 3)) out.push(...corner, ...normal);
+  }
+  return out;
+}
+
+/** Thin prisms along segments: pairs of points. */
+function wires(segments, radius, sides = 5) {
+  const out = [];
+  for (const [a, b] of segments) {
+    if (!(norm(minus(b, a)) > 0)) continue;
+    const [x, y] = across(unit(minus(b, a)));
+    const outward = (n) => plus(scaled(x, Math.cos((2 * Math.PI * n) / sides)), scaled(y, Math.sin((2 * Math.PI * n) / sides)));
+    for (let n = 0; n < sides; n++) {
+      const corner = (end, normal) => out.push(...plus(end, scaled(normal, radius)), ...normal);
+      quad(corner, [a, outward(n)], [a, outward(n + 1)], [b, outward(n + 1)], [b, outward(n)]);
+    }
   }
   return out;
 }

@@ -1,6 +1,6 @@
 // The page: the panel, the picture, and what happens between them.
 const MORE_AFTER = 60, FEW_FRAMES = 70;
-const MOST_CELLS = 112, LEAST_CELLS = 40, SLOW_SLICE = 50;
+const MOST_CELLS = 72, LEAST_CELLS = 28, SLOW_SLICE = 50;
 
 class Page {
   constructor(machine) {
@@ -16,15 +16,23 @@ class Page {
     this.delay = MORE_AFTER;
     this.cells = MOST_CELLS;
     this.sliceTook = 0;
+    this.borders = [];
+    this.paths = [];
     this.addButtons();
   }
 
   /** Answer what the address asks for. */
   begin(engine) {
-    this.session.engine = engine;
-    this.session.onChange = () => this.show();
-    this.session.open(location.hash);
-    this.session.remember();
+    const { session } = this;
+    session.engine = engine;
+    this.gizmo.isStill = !!engine.isStill;
+    this.hasSlice &&= !!engine.reachTest;
+    document.documentElement.classList.toggle("still", !!engine.isStill);
+    $("#slice").hidden = !this.hasSlice;
+    session.onChange = () => this.show();
+    session.onAsk = () => this.showAsked();
+    session.open(location.hash);
+    session.remember();
   }
 
   /** Draw, where the browser can. */
@@ -32,16 +40,42 @@ class Page {
     this.view = new Canvas(element);
     this.gestures = new Gestures(element, this);
     new ResizeObserver(() => this.redraw()).observe(element);
+    this.keepInView();
     this.redraw();
   }
 
   show() {
     const { session } = this;
-    this.scene.show(session.answer.pose, session.answer.q);
-    this.gizmo.show(session.target, session.answer.pose);
-    this.panel.show();
-    this.redraw();
+    this.scene.show(session.answer);
+    this.showAsked();
+    if (!session.isReported) this.live?.report();
     this.settle();
+  }
+
+  /** Show what is asked for, and the answer as it is. */
+  showAsked() {
+    const { session, gizmo } = this;
+    gizmo.show(session.target, session.answer.pose);
+    this.panel.show();
+    if (this.view && !this.gestures.held) this.keepInView();
+    this.redraw();
+  }
+
+  /** Step back where what is asked for has left the picture, unless one looks elsewhere. */
+  keepInView() {
+    const { session, gizmo, scene } = this;
+    const { camera } = scene;
+    const points = () => [...scene.platformAt(session.target), ...gizmo.letters.map(([, place]) => place)];
+    this.resize();
+    if (!this.seen || camera.sees(this.seen)) camera.keepInView(points);
+    this.seen = points();
+  }
+
+  lookFrom(angles) {
+    this.scene.camera.lookFrom(angles);
+    this.seen = null;
+    if (this.view) this.keepInView();
+    this.redraw();
   }
 
   /** Keep the end of a drag. */
@@ -52,22 +86,35 @@ class Page {
   /** What may lag behind a drag: travel, modes, the slice, and the link; the longer it takes, the less often. */
   showMore() {
     const { session, panel } = this;
+    const { engine, answer } = session;
     const began = performance.now();
-    if (session.answer.actuators) {
+    if (answer.actuators && engine.solve) {
       this.showSlice();
-      const from = session.engine.steady(session.answer);
-      panel.showTravel(session.engine.travel(from));
-      panel.showSingular(singularityOf(session.engine, from));
-      const marksOf = (answer) => this.scene.marksOf(answer);
-      panel.showModes(session.engine.modes(from, marksOf), marksOf(session.answer));
+      const from = engine.steady(answer);
+      panel.showTravel(engine.travel(from));
+      panel.showSingular(singularityOf(engine, from), (this.atHome ??= singularityOf(engine, engine.home) ?? {}));
+      const marksOf = (each) => this.scene.marksOf(each);
+      panel.showModes(engine.modes(from, marksOf), marksOf(answer));
     }
+    if (answer.actuators) this.live?.more();
     this.later = null;
     this.delay = Math.max(MORE_AFTER, 3 * (performance.now() - began));
-    if (this.gestures?.held) return;
+    if (this.gestures?.held || this.player?.clock || engine.newest?.isBusy) return;
     session.remember();
     this.showSteps();
     this.keepLink();
-    this.showSpeed();
+    if (engine.solve) this.showSpeed();
+  }
+
+  /** The ways along and about the axes of the task, both ways. */
+  waysFrom({ pose }) {
+    const { task } = this.machine;
+    return this.session.engine.axes.flatMap(([kind, axis]) =>
+      [-1, 1].map((sign) => {
+        const axisVector = axisOf(task, kind, axis, pose);
+        return { kind, axis, sign, axisVector, vector: scaled(axisVector, sign) };
+      }),
+    );
   }
 
   showSlice() {
@@ -85,14 +132,13 @@ class Page {
       return [centre - reach, centre + reach];
     });
     const began = performance.now();
-    this.view.setSlice(this.session.engine.slice(this.session.answer, [u, v], sides, this.cells), this.cells);
+    const width = 0.16 * this.scene.radius * length;
+    for (const mesh of Object.values(this.slice ?? {})) this.view.forget(mesh);
+    this.slice = areaOf(this.session.engine.reachTest(this.session.answer, [u, v]), sides, this.cells, width);
     this.sliceTook = performance.now() - began;
     if (this.sliceTook > 2 * SLOW_SLICE) this.cells = Math.max(LEAST_CELLS, this.cells >> 1);
-    const axes = [u, v].map((k, i) => scaled(AXES[k], (sides[i][1] - sides[i][0]) / (2 * length)));
-    const at = [0, 0, 0];
-    [u, v].forEach((k, i) => (at[k] = (sides[i][0] + sides[i][1]) / (2 * length)));
-    at[w] = pose[4 * w + 3] / length;
-    this.sliceModel = framed(...axes, AXES[w], at);
+    const at = scaled(AXES[w], pose[4 * w + 3] / length);
+    this.sliceModel = framed(...[u, v].map((k) => scaled(AXES[k], 1 / length)), AXES[w], at);
     this.redraw();
   }
 
@@ -109,21 +155,26 @@ class Page {
   }
 
   keepLink() {
-    if (location.hash === this.session.link) return;
+    const { link } = this.session;
+    if (location.hash === link) return;
     try {
-      history.replaceState(null, "", this.session.link);
+      history.replaceState(null, "", link || location.pathname + location.search);
     } catch {
-      location.hash = this.session.link;
+      location.hash = link;
     }
   }
 
-  async copyLink(button) {
+  copyLink(button) {
     this.keepLink();
+    return this.copy(button, location.href);
+  }
+
+  async copy(button, value) {
     const words = button.textContent;
     try {
-      await navigator.clipboard.writeText(location.href);
+      await navigator.clipboard.writeText(value);
     } catch {
-      const text = made("textarea", { value: location.href });
+      const text = made("textarea", { value });
       document.body.append(text);
       text.select();
       document.execCommand("copy");
@@ -133,19 +184,38 @@ class Page {
     setTimeout(() => (button.textContent = words), 1500);
   }
 
+  /** A switch of something that is shown, or not. */
+  addSwitch(id, change) {
+    $(id).onclick = ({ currentTarget }) => {
+      const isOn = currentTarget.getAttribute("aria-pressed") === "false";
+      currentTarget.setAttribute("aria-pressed", isOn);
+      change(isOn);
+      this.redraw();
+    };
+  }
+
   addButtons() {
     const { session } = this;
     $("#link").onclick = ({ currentTarget }) => this.copyLink(currentTarget);
     $("#home").onclick = () => session.goHome();
     $("#undo").onclick = () => session.undo();
     $("#redo").onclick = () => session.redo();
-    $("#slice").hidden = !this.hasSlice;
-    $("#slice").onclick = ({ currentTarget }) => {
-      this.hidesSlice = !this.hidesSlice;
-      currentTarget.setAttribute("aria-pressed", !this.hidesSlice);
+    const { drawing } = this.machine;
+    this.addSwitch("#slice", (isOn) => {
+      this.hidesSlice = !isOn;
       this.showSlice();
-      this.redraw();
-    };
+    });
+    this.addSwitch("#solids", (isOn) => (this.scene.hidesSolids = !isOn));
+    $("#solids").hidden = !drawing.parts.some((part) => part.shape !== undefined);
+    $("#show").hidden = $("#show-tab").hidden = $("#solids").hidden && !this.hasSlice;
+    const isNarrow = matchMedia("(max-width: 760px)");
+    const place = () => $(isNarrow.matches ? "#scroll" : "header").append($("#show"));
+    isNarrow.addEventListener("change", place);
+    place();
+    for (const [name, angles] of Object.entries(this.machine.views)) {
+      const onclick = () => this.lookFrom(angles);
+      $("#views").append(made("button", { textContent: name, title: `Look from: ${name}`, onclick }));
+    }
     const dark = matchMedia("(prefers-color-scheme: dark)");
     dark.addEventListener("change", () => this.light(dark.matches));
     $("#theme").onclick = () => this.light(!this.isDark);
@@ -210,11 +280,19 @@ class Page {
     const { scene, gizmo, session, paints } = this;
     const { camera } = scene;
     const isGhost = session.answer.status === PROJECTED && !session.wished;
-    const { solids, clear } = scene.solids(paints, session.held);
+    const { solids, clear } = scene.solids(paints, session.held, this.distance);
     if (isGhost) clear.push(...scene.ghost(session.target, paints.held));
     if (this.sliceModel && !this.hidesSlice) {
-      const paint = [...paints.platform.slice(0, 3), this.isDark ? 0.2 : 0.15];
-      clear.unshift({ mesh: SQUARE, model: this.sliceModel, paint, kind: SLICE });
+      const paint = (clarity) => [...paints.platform.slice(0, 3), clarity];
+      const [area, border] = ["area", "border"].map((name) => ({ mesh: this.slice[name], model: this.sliceModel, kind: FLAT }));
+      clear.unshift({ ...area, paint: paint(this.isDark ? 0.2 : 0.15) }, { ...border, paint: paint(0.6) });
+    }
+    for (const { mesh, paint } of this.borders) clear.push({ mesh, model: IDENTITY, paint, gloss: 0 });
+    for (const { mesh, paint } of this.paths) solids.push({ mesh, model: IDENTITY, paint: paints[paint], kind: FLAT });
+    if (this.distance && !scene.hidesSolids) {
+      const { ends, isHeld } = this.distance;
+      const paint = isHeld ? paints.held : paints.steel;
+      if (norm(minus(...ends)) > 1e-6) clear.push({ mesh: TUBE, model: tubeFrom(...ends, 0.5 * scene.radius), paint, kind: FLAT });
     }
     const side = 2.4 * scene.size;
     const floor = [scene.drawing.centre[0], scene.drawing.centre[1], camera.floor];
@@ -261,6 +339,11 @@ class Page {
       const [x, y] = scene.camera.onScreen(place);
       return [text, x - 4, y - 10, "xyz"[axis]];
     });
+    if (this.distance && !scene.hidesSolids) {
+      const [x, y] = scene.camera.onScreen(middle(this.distance.ends));
+      const { wording } = this.panel;
+      tags.push([`${wording.length(this.distance.distance)} ${wording.unit}`, x + 12, y - 10, "distance"]);
+    }
     const box = $("#names");
     const wanted = [...tags, ...letters];
     while (box.children.length < wanted.length) box.append(made("span"));
@@ -274,13 +357,21 @@ class Page {
   }
 }
 
+/** What answers: kernels in the page, the program that serves it, or nothing but what was written into it. */
+function engineFor(machine) {
+  if (machine.image) return Engine.open(KERNELS, machine);
+  return machine.live ? new RemoteEngine(machine) : new StillEngine(machine);
+}
+
 async function start() {
   const began = performance.now();
   const machine = JSON.parse($("#machine").textContent);
-  const opening = Engine.open(KERNELS, machine);
+  const opening = engineFor(machine);
   const page = new Page(machine);
-  page.begin(await opening);
   window.page = page;
+  page.begin(await opening);
+  if (machine.live) page.live = new Live(page);
+  if (machine.track) page.player = await Player.open(page, machine.track);
   page.times = [began, performance.now()];
   try {
     page.draw($("canvas"));

@@ -36,7 +36,7 @@ class Panel {
     Object.assign(this, { machine, session, wording: new Wording(machine) });
     const { slides, turns } = machine.task;
     this.addFields([...slides, ...turns.map((axis) => 3 + axis)]);
-    this.addActuators();
+    this.addRows();
     this.addTabs();
     const units = [slides.length ? this.wording.unit : "", turns.length ? "degrees" : ""].filter(Boolean);
     $("#units").textContent = units.join(", ");
@@ -59,35 +59,56 @@ class Panel {
     const [position, angles] = [originOf(target), anglesOf(target)];
     if (k < 3) position[k] = value / this.wording.factor;
     else angles[k - 3] = value;
-    this.session.ask(poseOf(position, angles));
+    this.session.ask(poseOf(position, angles), { gesture: `field ${k}` });
   }
 
-  addActuators() {
-    const { actuators, length } = this.machine;
-    $("#actuators").classList.toggle("wide", actuators.some(({ name }) => name.length > 8));
-    this.rows = actuators.map(({ name, isAngle, low, high, home }, k) => {
-      const span = isAngle ? Math.PI : length;
-      const [min, max] = [low ?? home - span, high ?? home + span];
-      const input = made("input", { type: "range", ariaLabel: name });
-      Object.assign(input, { min, max, step: (max - min) / 4000 });
-      input.oninput = () => this.drive(k, Number(input.value));
-      const ends = [low, high].map((end) => (end === null ? "free" : this.wording.value(end, isAngle)));
-      const text = made("output");
-      const wish = made("i", { className: "wish", hidden: true });
-      const slider = made("span", { className: "slider" }, input, wish);
-      const row = made("div", { className: "row", title: `${name}: ${ends.join(" to ")}` }, made("span", { textContent: name }), slider, text);
-      $("#actuators div").append(row);
-      return { row, input, text, wish, min, max };
-    });
+  /** Sliders of the actuators, and of passive joints in series that carry the end effector. */
+  addRows() {
+    const { actuators, series } = this.machine;
+    this.rows = actuators.map((each, k) => this.addRow("#actuators", each, (value) => this.drive(k, value)));
+    this.jointRows = (series?.coordinates ?? []).map((each, k) => this.addRow("#joints", each, (value) => this.driveJoint(k, value)));
+    $("#joints").hidden = !series;
+    for (const [id, all] of [["#actuators", actuators], ["#joints", series?.coordinates ?? []]])
+      $(id).classList.toggle("wide", all.some(({ name }) => name.length > 8));
+  }
+
+  addRow(id, { name, isAngle, low, high, home }, ask) {
+    const span = isAngle ? Math.PI : this.machine.length;
+    const [min, max] = [low ?? home - span, high ?? home + span];
+    const input = made("input", { type: "range", ariaLabel: name });
+    Object.assign(input, { min, max, step: (max - min) / 4000 });
+    input.oninput = () => ask(Number(input.value));
+    const ends = [low, high].map((end) => (end === null ? "free" : this.wording.value(end, isAngle)));
+    const text = made("output");
+    const wish = made("i", { className: "wish", hidden: true });
+    const slider = made("span", { className: "slider" }, input, wish);
+    const row = made("div", { className: "row", title: `${name}: ${ends.join(" to ")}` }, made("span", { textContent: name }), slider, text);
+    $(`${id} div`).append(row);
+    return { row, input, text, wish, min, max };
   }
 
   drive(k, value) {
-    const { answer, wished } = this.session;
-    this.session.assemble((wished ?? answer.actuators).map((each, i) => (i === k ? value : (answer.actuators?.[i] ?? each))));
+    const { answer, wished, start, engine } = this.session;
+    const last = wished ?? answer.actuators ?? start?.actuators ?? engine.home.actuators;
+    const values = last.map((each, i) => (i === k ? value : (answer.actuators?.[i] ?? each)));
+    this.session.assemble(values, `actuator ${k}`);
+  }
+
+  driveJoint(k, value) {
+    const values = (this.session.joints ?? this.joints).map((each, i) => (i === k ? value : each));
+    this.session.askJoints(values, `joint ${k}`);
+  }
+
+  /** Where the joints in series are in the answer. */
+  get joints() {
+    return this.machine.series.coordinates.map(({ home, column }) => home + this.session.answer.q[column]);
   }
 
   addTabs() {
-    const tabs = { pose: "Pose", actuators: "Actuators", travel: "Travel", near: "Singularity", modes: "Modes" };
+    const tabs = {
+      pose: "Pose", joints: "Joints", actuators: "Actuators", near: "Singularity", travel: "Travel", close: "Limits",
+      modes: "Modes", show: "Show",
+    };
     const open = (name) => {
       for (const each of Object.keys(tabs)) {
         $(`#${each}`).classList.toggle("shown", each === name);
@@ -98,12 +119,15 @@ class Panel {
       const button = made("button", { id: `${name}-tab`, textContent, onclick: () => open(name) });
       button.setAttribute("role", "tab");
       button.setAttribute("aria-controls", name);
+      button.hidden = $(`#${name}`).hidden;
       $("nav").append(button);
     }
     open("actuators");
   }
 
   show() {
+    const { answer } = this.session;
+    if (answer.status !== PROJECTED || answer.limits.length) this.reason = "";
     this.showStatus();
     this.showFields();
     this.showActuators();
@@ -125,13 +149,20 @@ class Panel {
     $("#limits").replaceChildren(...chips);
   }
 
+  /** The reason of an answer that no limit holds back, from the program that serves the page. */
+  showReason(reason) {
+    this.reason = `${reason[0].toUpperCase()}${reason.slice(1)}.`;
+    this.showStatus();
+  }
+
   explanation() {
     const { answer, wished, hasJumped } = this.session;
     const has = answer.limits.length > 0;
-    const kept = this.machine.limits.length ? "Every limit kept, all loops closed." : "All loops closed; this machine has no limits.";
+    const kept = this.machine.hasLimits ? "Every limit kept, all loops closed." : "All loops closed; this machine has no limits.";
     if (answer.status === REACHED) return has ? "Every limit kept; it lies on" : kept;
     if (answer.status === EXCEEDED) return "The loops close in this mode, but beyond";
     if (answer.status >= FAILED) return "The last feasible pose is shown.";
+    if (!has && this.reason) return this.reason;
     if (wished) return "These values do not fit together; this is the nearest that does.";
     const how = hasJumped ? "Nearest feasible pose, to which drives would jump," : "Nearest feasible pose,";
     return `${how} ${this.distance(answer)} short. ${has ? "Stopped by" : "Its links are stretched."}`;
@@ -156,15 +187,21 @@ class Panel {
   }
 
   showActuators() {
-    const { answer, wished } = this.session;
-    const limits = new Set(answer.limits.map(({ joint }) => joint));
-    this.rows.forEach(({ row, input, text, wish, min, max }, k) => {
-      const { isAngle, joint } = this.machine.actuators[k];
-      const value = answer.actuators ? answer.actuators[k] : NaN;
+    const { answer, wished, joints } = this.session;
+    const { actuators, series } = this.machine;
+    this.showRows(this.rows, actuators, answer.actuators, wished);
+    if (series) this.showRows(this.jointRows, series.coordinates, answer.actuators && this.joints, joints);
+  }
+
+  showRows(rows, coordinates, values, wished) {
+    const limits = new Set(this.session.answer.limits.map(({ joint }) => joint));
+    rows.forEach(({ row, input, text, wish, min, max }, k) => {
+      const { isAngle, joint } = coordinates[k];
+      const value = values ? values[k] : NaN;
       const isHeld = limits.has(joint);
       const share = (at) => `${100 * clamp((at - min) / (max - min), 0, 1)}%`;
-      if (answer.actuators) input.value = value;
-      text.textContent = answer.actuators ? this.wording.value(value, isAngle) : "–";
+      if (values && !(this.session.engine.newest?.isBusy && document.activeElement === input)) input.value = value;
+      text.textContent = values ? this.wording.value(value, isAngle) : "–";
       row.classList.toggle("held", isHeld);
       row.style.setProperty("--share", share(value));
       wish.hidden = !wished || !(Math.abs(wished[k] - value) > 1e-3 * (max - min));
@@ -211,8 +248,8 @@ class Panel {
   }
 
   /** Bars of the measures as shares of those at home, purple where they are small. */
-  showSingular(measures) {
-    this.atHome ??= singularityOf(this.session.engine, this.session.engine.home) ?? {};
+  showSingular(measures, atHome) {
+    this.atHome = atHome;
     const rows = ["serial", "parallel"].map((kind) => {
       const share = measures ? measures[kind] / this.atHome[kind] : NaN;
       const percent = clamp(Math.round(100 * share), 0, 100);
@@ -220,14 +257,35 @@ class Panel {
       fill.style.width = `${percent || 0}%`;
       fill.style.background = `color-mix(in srgb, var(--blue) ${percent || 0}%, var(--singular))`;
       const leg = kind === "serial" && measures?.leg && share < 0.5 ? `: ${measures.leg}` : "";
-      const title = `${MEANINGS[kind]}: ${measures?.[kind].toPrecision(3)}, at home ${this.atHome[kind]?.toPrecision(3)}`;
+      const title = `${MEANINGS[kind]}: ${measures?.[kind]?.toPrecision(3)}, at home ${this.atHome[kind]?.toPrecision(3)}`;
       const [name, value] = [made("span", { textContent: kind + leg }), made("output", { textContent: Number.isFinite(share) ? `${(100 * share).toFixed(0)} %` : "–" })];
       return made("div", { className: "row", title }, name, made("span", { className: "bar" }, fill), value);
     });
-    $("#near").hidden = $("#near-tab").hidden = !(this.atHome.serial > 1e-6 && measures);
+    this.hide("near", !(this.atHome.serial > 1e-6 && measures));
     $("#near div").replaceChildren(...rows);
     this.session.observe(measures);
     $("#crossing").textContent = this.crossing(measures);
+  }
+
+  /** The nearest limits, as the program that serves the page found them: bars that are full in the middle of a range. */
+  showLimits(limits, others) {
+    const rows = limits.map(({ name, margin, left, unit, isOn }) => {
+      const fill = made("i");
+      fill.style.width = `${100 * clamp(margin, 0, 1)}%`;
+      const isAngle = unit === "deg";
+      const amount = isOn ? 0 : left;
+      const words = isAngle ? `${rounded(amount, 1)}°` : `${this.wording.length(amount)} ${this.wording.unit}`;
+      const row = made("div", { className: isOn ? "row held" : "row", title: `${name}: ${words} left` });
+      row.append(made("span", { textContent: name }), made("span", { className: "bar" }, fill), made("output", { textContent: words }));
+      return row;
+    });
+    this.hide("close", !limits.length);
+    $("#close span").textContent = others ? `and ${others} farther off` : "";
+    $("#close div").replaceChildren(...rows);
+  }
+
+  hide(name, isHidden) {
+    $(`#${name}`).hidden = $(`#${name}-tab`).hidden = isHidden;
   }
 
   /** A sentence about the singularity that an answer is on, or that it has passed. */
@@ -241,7 +299,7 @@ class Panel {
 
   /** A button for each mode, numbered as in the library's list. */
   showModes(modes, present) {
-    $("#modes").hidden = $("#modes-tab").hidden = modes.length < 2;
+    this.hide("modes", modes.length < 2 && !this.machine.live);
     const buttons = modes.map((mode, k) => {
       const isBeyond = mode.status === EXCEEDED;
       const title = isBeyond ? `Mode ${k + 1}, beyond limits` : `Mode ${k + 1}`;

@@ -8,7 +8,7 @@ class Scene {
     this.length = machine.length;
     this.home = reversed(withLengths(machine.home, 1 / this.length));
     this.names = new Map(this.drawing.points.map((point, k) => [point.joint, k]));
-    const home = this.pointsAt(machine.home, new Array(machine.columns).fill(0));
+    const home = this.pointsAt(machine.home, new Array(machine.columns).fill(0), machine.homeAnswer?.frames);
     this.homePoints = home;
     this.meshes = this.drawing.parts.map((part) => this.meshOf(part, home));
     this.camera = new Camera(this.drawing, home);
@@ -26,9 +26,10 @@ class Scene {
     return part.kind === "mesh" ? faceted(part.vertices, part.faces) : null;
   }
 
-  /** The displacements from home of base, platform, and the bodies that follow from joint coordinates. */
-  framesAt(pose, q) {
+  /** The displacements from home of base, platform, and the other bodies: by joint coordinates, or as Python found them. */
+  framesAt(pose, q, given) {
     const frames = [IDENTITY, product(withLengths(pose, 1 / this.length), this.home)];
+    if (given) return [...frames, ...given];
     for (const [parent, ...motions] of this.drawing.frames)
       frames.push(motions.reduce((frame, motion) => product(frame, this.moved(motion, q)), frames[parent]));
     return frames;
@@ -39,7 +40,8 @@ class Scene {
     return norm(axis) ? turn(axis, value, cross(axis, velocity)) : shift(scaled(velocity, value / this.length));
   }
 
-  pointsAt(pose, q, frames = this.framesAt(pose, q)) {
+  pointsAt(pose, q, given) {
+    const frames = this.framesAt(pose, q, given);
     const points = [];
     for (const { at, frame, amid } of this.drawing.points)
       points.push(amid ? middle(amid.map((k) => points[k])) : placed(frames[frame], at));
@@ -47,31 +49,32 @@ class Scene {
   }
 
   /** What tells configurations apart, as the library's fingerprints: end effector, actuators, and centres of joints. */
-  marksOf({ pose, q, actuators }) {
+  marksOf({ pose, q, actuators, frames: given }) {
     const turns = actuators.map((value, k) =>
       this.machine.actuators[k].isAngle ? [Math.cos(value), Math.sin(value)] : [value / this.length],
     );
-    const frames = this.framesAt(pose, q);
+    const frames = this.framesAt(pose, q, given);
     const end = withLengths(frames[this.drawing.end], 0);
-    const joints = this.pointsAt(pose, q, frames).filter((_, k) => this.drawing.points[k].joint);
+    const joints = this.pointsAt(pose, q, given).filter((_, k) => this.drawing.points[k].joint);
     return [...end, ...scaled(originOf(pose), 1 / this.length), ...turns.flat(), ...joints.flat()];
   }
 
   /** Place everything at an answer. */
-  show(pose, q) {
+  show({ pose, q, frames }) {
     this.pose = withLengths(pose, 1 / this.length);
-    this.frames = this.framesAt(pose, q);
-    this.points = this.pointsAt(pose, q, this.frames);
+    this.frames = this.framesAt(pose, q, frames);
+    this.points = this.pointsAt(pose, q, frames);
   }
 
   /** Solids at the answer, what joints at their limits light up in another colour; and the shapes of bodies, clear. */
-  solids(paints, held) {
+  solids(paints, held, distance) {
     const [solids, clear] = [[], []];
     this.drawing.parts.forEach((part, k) => {
-      const isHeld = part.joints.some((name) => held.has(name));
-      const paint = isHeld ? paints.held : paints[part.paint];
-      if (part.isClear) this.addPart(clear, part, this.meshes[k], [...paint.slice(0, 3), 0.16]);
-      else this.addPart(solids, part, this.meshes[k], paint);
+      const isShape = part.shape !== undefined, isNearest = isShape && !!distance?.shapes.includes(part.shape);
+      const isHeld = part.joints.some((name) => held.has(name)) || (isNearest && distance.isHeld);
+      const paint = isHeld ? paints.held : isNearest ? paints.steel : paints[part.paint];
+      if (!isShape) this.addPart(solids, part, this.meshes[k], paint);
+      else if (!this.hidesSolids) this.addPart(clear, part, this.meshes[k], [...paint.slice(0, 3), isNearest ? 0.3 : 0.16]);
     });
     return { solids, clear };
   }
@@ -104,6 +107,12 @@ class Scene {
     const collar = plus(start, scaled(direction, part.length - 1.8 * r));
     out.push({ mesh: TUBE, model: tubeFrom(start, tip, r), paint, gloss: 0.3 });
     out.push({ mesh: TUBE, model: tubeFrom(collar, tip, 1.22 * r), paint, gloss: 0.3 });
+  }
+
+  /** Where the joints of the platform would be at a pose. */
+  platformAt(pose) {
+    const frame = product(withLengths(pose, 1 / this.length), this.home);
+    return [...this.drawing.platform.map((k) => placed(frame, this.homePoints[k])), originOf(withLengths(pose, 1 / this.length))];
   }
 
   /** What the platform would be at a pose: clear, with a dashed line to where it is. */
@@ -148,6 +157,8 @@ function arcBetween(start, end, centre) {
   return Array.from({ length: steps + 1 }, (_, k) => placed(turn(axis, (angle * k) / steps, centre), start));
 }
 
+const UPRIGHT = Math.PI / 2 - 1e-3, ROOM = 24, MOST_STEPS_BACK = 60;
+
 /** Where the eye is, and what it sees. */
 class Camera {
   constructor(drawing, points) {
@@ -160,6 +171,27 @@ class Camera {
 
   reset() {
     Object.assign(this, this.start);
+  }
+
+  /** Look from a direction, from where the machine is seen as at first. */
+  lookFrom([azimuth, elevation]) {
+    Object.assign(this, this.start, { azimuth, elevation: clamp(elevation, -UPRIGHT, UPRIGHT) });
+  }
+
+  sees(points) {
+    const { width, height, covered } = this;
+    return points.every((point) => {
+      const [x, y] = this.onScreen(point);
+      return x > ROOM && x < width * (1 - covered) - ROOM && y > ROOM && y < height - ROOM;
+    });
+  }
+
+  /** Step back until the points that a function returns are in the picture. */
+  keepInView(points) {
+    for (let n = 0; n < MOST_STEPS_BACK && !this.sees(points()); n++) {
+      this.distance *= 1.06;
+      this.look();
+    }
   }
 
   orbit(x, y) {

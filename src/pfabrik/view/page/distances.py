@@ -1,13 +1,12 @@
-"""Distances of an answer that the panel shows: from its limits, and from singularities."""
+"""What is left of an answer to its limits, and on which side of singularities it is, next to which leg's dead point."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from ...answers.differential import forward_jacobian, singularity
+from ...answers.differential import forward_jacobian
 from ...answers.margins import nearest_first
 from ...answers.solution import Solution
 from ...kinematics import actuator_units, generic_of, parallel_signs
@@ -69,46 +68,13 @@ def _left(solution: Solution, joint: str, bound: str, margin: float) -> tuple[fl
     return found
 
 
-@dataclass(frozen=True)
-class Nearness:
-    """Distance of an answer from one kind of singularity.
-
-    Attributes
-    ----------
-    kind : str
-        "serial" or "parallel".
-    measure, at_home : float
-        As of `singularity`, now and at home.
-    leg : str
-        The actuator whose leg alone is nearest to its dead point; empty if there is none.
-    """
-
-    kind: Literal["serial", "parallel"]
-    measure: float
-    at_home: float
-    leg: str = ""
-
-    @property
-    def share(self) -> float:
-        """The measure as a share of that at home; of 1, where home itself is singular."""
-        return self.measure / (self.at_home if TOLERANCES.singular < self.at_home < np.inf else 1.0)
-
-
-def nearness(solution: Solution, home: Solution) -> tuple[Nearness, Nearness]:
-    """Distances of an answer from serial and from parallel singularities."""
-    now, before = singularity(solution), singularity(home)
-    leg = _nearest_leg(solution)
-    serial = Nearness("serial", float(now.serial), float(before.serial), leg)
-    return serial, Nearness("parallel", float(now.parallel), float(before.parallel))
-
-
 def side_of(solution: Solution) -> float:
     """The side of the parallel singularities that an answer is on: 1 or -1; 0 on one, and NaN where none is known."""
     signs = parallel_signs(solution.mechanism, solution._coordinates, forward_jacobian(solution)[None])
     return float(signs[0])
 
 
-def _nearest_leg(solution: Solution) -> str:
+def leg_at_dead_point(solution: Solution) -> str:
     """The actuator that moves most in the motion that moves the end effector least, if it leads that motion.
 
     This motion is the last right singular vector of the forward Jacobian: at a serial singularity the actuators of the
