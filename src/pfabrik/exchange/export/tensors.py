@@ -13,7 +13,7 @@ from ...common.arrays import Floats
 from ...common.checks import require_choice, require_names
 from ...common.whole_files import whole_path
 from ...machine.description.mechanism import Mechanism, checked_mechanism
-from .tensor_tables import TensorMachine
+from .tensor_machine import TensorMachine
 from .tensor_text import Steps, tensor_text
 
 N_TRIED = 400
