@@ -1,4 +1,4 @@
-# mypy: disable-error-code="no-untyped-def, no-untyped-call"
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, var-annotated"
 """The functions of a file of tensors: their text goes into files, for NumPy, PyTorch or JAX.
 
 What stands here first is of every machine and library its own, in its file: constants, what arrays are made of, and
@@ -8,40 +8,19 @@ are behind them; lengths are in SIZE.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as xp
 
 SIZE, STEPS, COMPLETING_STEPS = 1.0, 5, 5
 N_PARAMETERS, N_PROXIMAL, N_OPEN, N_MOTIONS, ROTATIONS = 0, 0, 0, 6, 3
-JOINTS: Any = ()
-SET_AXES: Any = (1.0, 1.0, 1.0)
-DIMENSIONS: Any = {}
-_CONSTANTS: Any = ()
-JOINT_UNITS: Any = ()
-RATE_UNITS: Any = ()
+DIMENSIONS: dict[str, Any] = {}
+JOINTS = _CONSTANTS = JOINT_UNITS = RATE_UNITS = SET_AXES = cast(Any, ())
 ACCURACY = {"float64": 1e-13, "float32": 1e-6}
 CLOSED = {"float64": 1e-9, "float32": 1e-4}
 UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-_tensor: Any
-_array_of: Any
-_kind: Any
-_places: Any
-_cached: Any = staticmethod
-_whole: Any
-_detach: Any
-_repeat: Any
-_largest: Any
-_root: Any
-_atan2: Any
-_home: Any
-_placed: Any
-_rates: Any
-_rooms: Any
-_equations: Any
-_closing: Any
-_proximal: Any
-_walked: Any
+_tensor = _array_of = _kind = _places = _cached = _whole = _detach = _largest = _root = _atan2 = cast(Any, staticmethod)
+_home = _placed = _rates = _rooms = _equations = _closing = _proximal = _walked = cast(Any, None)
 
 
 class _Numbers:
@@ -88,7 +67,7 @@ def _joined(parts, like):
     """Numbers along one axis, from pairs of some of them and their count."""
     lead = tuple(like.shape)
     rows = [0.0 * like + part if isinstance(part, float) else part for part, _ in parts]
-    return xp.concatenate([xp.broadcast_to(row, (n, *lead)) for row, (_, n) in zip(rows, parts)], 0)
+    return xp.concatenate([xp.broadcast_to(row, (n, *lead)) for row, (_, n) in zip(rows, parts, strict=True)], 0)
 
 
 def _picked(x, places):
@@ -186,6 +165,13 @@ def _solve(J, off):
     return xp.stack(step)
 
 
+def _repeat(step, times, state):
+    """A state after a number of steps."""
+    for _ in range(times):
+        state = step(state)
+    return state
+
+
 def _limited(step):
     """A step no longer than half a characteristic length, or half a radian."""
     size = _norm(step)
@@ -195,8 +181,8 @@ def _limited(step):
 def _moved_by(R, p, twist):
     """A pose after a twist (6, ...), in SIZE and in radians.
 
-    The turn is that of the Rodrigues vector c = w / 2, which is a turn by w to second order: I + 2 (C + C C) / (1 + c c),
-    where C is the cross product by c.
+    The turn is that of the Rodrigues vector c = w / 2, a turn by w to second order: I + 2 (C + C C) / (1 + c c), where
+    C is the cross product by c.
     """
     c = 0.5 * twist[3:]
     across = _cross(c, R)
@@ -265,8 +251,9 @@ def to_pose(actuators, start=None, parameters=None, steps=STEPS):
         return step if N_MOTIONS == 6 else xp.concatenate([step[:3], 0.0 * step[:3], step[3:]], 0)
 
     def step(now):
-        step = _limited(solved(fixed, wanted, *now, lambda J: J))
-        return *_moved_by(*now[:2], step[:6]), now[2] + step[6:]
+        R, p, z = now
+        step = _limited(solved(fixed, wanted, R, p, z, lambda J: J))
+        return *_moved_by(R, p, step[:6]), z + step[6:]
 
     R, p, z = map(_detach, _repeat(step, steps, (R, p, z)))
     return _pose(*_moved_slightly(R, p, solved(home, values, R, p, z, _detach)[:6]))
@@ -414,7 +401,10 @@ def velocities(q, rates, parameters=None):
 
 
 def torques_to_coordinates(q, torques, parameters=None):
-    """What torques and forces of actuators (..., n_a) do at TORQUES_AT: the transpose of the Jacobian."""
+    """What torques and forces of actuators (..., n_a) do at TORQUES_AT.
+
+    They are multiplied by the transpose of the Jacobian.
+    """
     return (jacobian(q, parameters) * torques[..., None]).sum(-2)
 
 

@@ -1,7 +1,8 @@
 """A machine as its file of tensors knows it: its dimensions by name, and what the kernels' routines make of them.
 
 The routines of `kernels.legs` and `kernels.pose` are run once on numbers that note their steps: at a pose as the legs
-answer it in closed form; at a pose and given proximal coordinates, with nothing eliminated, as Newton's method takes it.
+answer it in closed form; at a pose and given proximal coordinates, with nothing eliminated, as Newton's method takes
+it.
 """
 
 from __future__ import annotations
@@ -106,7 +107,7 @@ class TensorMachine:
         self.given: list[tuple[str, Any]] = []
         self.constants: list[tuple[str, Any]] = []
         self._table, model = kernel_table(model_of(mechanism).legs), model_of(mechanism)
-        self._task = {"reference": None, "rows": int(self._table.task[0]["rows"])}
+        self._task: dict[str, Any] = {"rows": int(self._table.task[0]["rows"])}
         self._records = self._noted(model.legs.forms)
         self._homes = self._dimension("actuators.home", [d.home for d in self.machine.driven], mechanism.actuator_names)
         self._motions = None if self.path is None else self._noted_path()
@@ -114,7 +115,7 @@ class TensorMachine:
 
         homes = [driven.home for driven in self.machine.driven]
         pose = np.eye(3), np.array(mechanism.reference_point) / self.size
-        given = *pose, homes, np.zeros(n_open), [] if self.path is None else self.path.home
+        given: Any = (*pose, homes, np.zeros(n_open), [] if self.path is None else self.path.home)
         self.R, self.p, self.actuators, self.proximal, self.joints = (
             self._inputs(values, is_open=True).ravel().tolist() for values in given
         )
@@ -166,9 +167,10 @@ class TensorMachine:
         records = {name: noted_records(getattr(self._table, name), [{}] * len(getattr(self._table, name)))
                    for name in ("limited", "cones", "driven")}  # fmt: skip
         for each in (*records["limited"], *records["driven"]):
-            is_unbounded = each["hi"] - each["lo"] == math.inf and each["lo"] == -each["hi"]
-            bound = math.pi if is_unbounded else FAR  # within half a turn of home
-            each["lo"], each["hi"] = max(each["lo"], -bound), min(each["hi"], bound)
+            each["lo"], each["hi"] = max(each["lo"], -FAR), min(each["hi"], FAR)
+        for each in records["driven"]:
+            if each["hi"] - each["lo"] == 2.0 * FAR:  # counted to within half a turn of home
+                each["lo"], each["hi"] = -math.pi, math.pi
         for name, coordinates in records.items():
             for field in ("sense", "lo", "hi", "half_angle") if len(coordinates) else ():
                 if field in coordinates[0]:
@@ -182,7 +184,7 @@ class TensorMachine:
         return records | {"legs": noted_records(self._table.legs, fields)}
 
     def _alike(self, name: str, values: Sequence[float]) -> list[Any]:
-        """Values as they are if they are one value, else as inputs of their own: legs that are alike keep one formula."""
+        """Values as they are if they are one value, else as inputs: legs that are alike keep one formula."""
         if len(set(values)) <= 1:
             return list(values)
         self.constants.append((name, self._inputs(values)))
@@ -215,7 +217,7 @@ class TensorMachine:
         lengths = read("length", records["length"] * self.size) / self.size
         first = records[0]
         axes = read("axis", records["proximal_axis"]) if first["has_proximal"] else [None] * len(legs)
-        centres = [None] * len(legs)
+        centres: Any = [None] * len(legs)
         if first["proximal"] == K.CRANK:
             centres = read("centre", records["proximal_point"] * self.size) / self.size
         hinges = {
@@ -239,13 +241,14 @@ class TensorMachine:
         """Pivots at their dimensions: centre, slides, and hinges."""
         records, of = self._table.legs[legs], self._joints_of(legs)
         first = forms[0]
-        centres, slides, axes = [None] * len(legs), None, None
+        centres: Any = [None] * len(legs)
+        slides, axes = None, None
         if first.ending.centre is not None and isinstance(first, Pivot):
             values = [form.ending.centre for form in forms]
             centres = self._dimension(f"{name}.centre", np.array(values) * self.size, of) / self.size
         if isinstance(first, Pivot) and first.slides:
-            values = [[slide.axis for slide in form.slides] for form in forms if isinstance(form, Pivot)]
-            slides = self._dimension(f"{name}.slides", values, of)
+            rows = [[slide.axis for slide in form.slides] for form in forms if isinstance(form, Pivot)]
+            slides = self._dimension(f"{name}.slides", rows, of)
         if n := AXES.get(int(records[0]["base_end"])):
             axes = self._dimension(f"{name}.axes", records["base_end_axes"][:, :n], of)
         for row, form in enumerate(forms):
@@ -491,8 +494,8 @@ class TensorMachine:
         """Rates of actuators by those of coordinates in the mechanism's units, from those in L and rad, (k, n_a)."""
         units = np.array([self.size if each.is_length else 1.0 for each in self.machine.driven])
         if self.path is None:
-            return units / np.repeat([self.size, 1.0], 3)[:, None]
-        return units / np.where(self.path.is_angle, 1.0, self.size)[:, None]
+            return np.asarray(units / np.repeat([self.size, 1.0], 3)[:, None])
+        return np.asarray(units / np.where(self.path.is_angle, 1.0, self.size)[:, None])
 
     def samples(self, n: int) -> Floats:
         """Coordinates of joints (n, k) all over their ranges, around home where they have none; or poses (n, 4, 4)."""
@@ -505,7 +508,7 @@ class TensorMachine:
         return np.asarray(random.uniform(low, high, (n, len(reach))))
 
 
-LIKENESS = "kind frame proximal base_end platform_end slides twists n_rows upright".split()
+LIKENESS = ("kind", "frame", "proximal", "base_end", "platform_end", "slides", "twists", "n_rows", "upright")
 """Fields in which legs that are alike agree."""
 
 

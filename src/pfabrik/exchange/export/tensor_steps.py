@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...kernels import noted_steps as K
-from ...machine.noted_numbers import INPUT, Number, numbers_behind
+from ...machine.noted_numbers import Number, numbers_behind
 
 TEXTS = {
     K.ADD: "{} + {}",
@@ -38,10 +38,18 @@ TEXTS = {
 """Text of a step, from those of its operands."""
 
 SUM, PRODUCT, ATOM = 1, 2, 3
-BINDS = {K.ADD: SUM, K.SUBTRACT: SUM, K.MULTIPLY: PRODUCT, K.COPYSIGN: PRODUCT, K.BELOW: 0, K.AT_MOST: 0, K.SMALLER: SUM}
+BINDS = {
+    K.ADD: SUM,
+    K.SUBTRACT: SUM,
+    K.MULTIPLY: PRODUCT,
+    K.COPYSIGN: PRODUCT,
+    K.BELOW: 0,
+    K.AT_MOST: 0,
+    K.SMALLER: SUM,
+}
 """How closely a text binds."""
 
-WIDEST = 112
+WIDEST = 96
 """Columns of a line, as far as it can be."""
 
 
@@ -121,13 +129,11 @@ class Body:
             step.members.append(each)
             steps[each.place] = step
         for step in dict.fromkeys(steps.values()):
-            operands = [[each.trace.steps[each.place][1][k] for each in step.members]
-                        for k in range(len(step.members[0].trace.steps[step.members[0].place][1]))]  # fmt: skip
-            for parts in operands:
-                if isinstance(parts[0], Number) and parts[0].place in steps:
-                    behind = steps[parts[0].place]
-                    are_all = [part.place for part in parts] == [each.place for each in behind.members]
-                    behind.n_uses += 1 if are_all else 2
+            for operand in _operands(step.members):
+                if isinstance(operand[0], Number) and operand[0].place in steps:
+                    behind = steps[operand[0].place]
+                    is_whole = [part.place for part in operand] == [each.place for each in behind.members]
+                    behind.n_uses += 1 if is_whole else 2
         return steps
 
     def _label(self, part: Any, steps: Mapping[int, _Step]) -> Any:
@@ -137,7 +143,7 @@ class Body:
 
     def _write(self, step: _Step, steps: Mapping[int, _Step]) -> None:
         first = step.members[0]
-        columns = [list(column) for column in zip(*(first.trace.steps[x.place][1] for x in step.members), strict=True)]
+        columns = _operands(step.members)
         operands = [self._operand(column) for column in columns]
         text, binds = self._text(step.operation, operands, columns)
         if len(text) > WIDEST:
@@ -232,6 +238,14 @@ class Body:
             return None
         return text.removeprefix("_larger(").removesuffix(", 0.0)")
 
+    def order(self, columns: Sequence[Sequence[Any]]) -> list[int]:
+        """The order of rows in which those that are alike in all columns are neighbours."""
+        rows = list(zip(*columns, strict=True))
+        at = [[self.places.get(x.place) if isinstance(x, Number) else x for x in row] for row in rows]
+        keys = [repr([each[0].text if isinstance(each, tuple) else each for each in row]) for row in at]
+        first = {key: keys.index(key) for key in keys}
+        return sorted(range(len(rows)), key=lambda row: first[keys[row]])
+
     def output(self, numbers: Sequence[Any]) -> str:
         """The text of numbers as one array, along its first axis."""
         runs: list[tuple[Variable | float, list[int]]] = []
@@ -241,10 +255,9 @@ class Body:
                 runs[-1][1].append(place)
             else:
                 runs.append((variable, [place]))
-        if len(runs) == 1 and isinstance(runs[0][0], Variable):
-            variable, places = runs[0]
-            if variable.is_open and variable.size == len(places) > 1:
-                return picked(variable, places)
+        whole, places = runs[0]
+        if len(runs) == 1 and isinstance(whole, Variable) and whole.is_open and whole.size == len(places) > 1:
+            return picked(whole, places)
         if len(runs) > 2 * len({run for run, _ in runs}):
             return self._reordered(runs)
         return self._joined(runs)
@@ -263,7 +276,12 @@ class Body:
     def _joined(self, runs: Sequence[tuple[Variable | float, list[int]]]) -> str:
         """The text of numbers of several variables."""
         parts = ", ".join(f"({picked(v, at) if isinstance(v, Variable) else repr(v)}, {len(at)})" for v, at in runs)
-        return f"_joined(({parts},), {self._like})"
+        return f"_joined(({parts}{',' * (len(runs) == 1)}), {self._like})"
+
+
+def _operands(members: Sequence[Number]) -> list[list[Any]]:
+    """Of each operand of a step, what it is of all members."""
+    return [list(column) for column in zip(*(each.trace.steps[each.place][1] for each in members), strict=True)]
 
 
 def picked(variable: Variable, places: list[int]) -> str:

@@ -14,7 +14,7 @@ from . import tensor_functions
 from .source import NOTICE, selected
 from .static_data import comment
 from .tensor_machine import TensorMachine
-from .tensor_steps import Body, Places, Variable
+from .tensor_steps import WIDEST, Body, Places, Variable
 
 LIBRARIES = {"numpy": "NumPy", "torch": "PyTorch", "jax": "JAX"}
 
@@ -32,72 +32,50 @@ def tensor_text(machine: TensorMachine, backend: str, steps: Steps) -> str:
     parts = [
         _header(machine, backend),
         selected(head, {backend.upper()}).strip("\n"),
-        REPEAT[backend],
         "\n".join(_tables(machine, steps)),
         _functions(machine, backend),
     ]
     return re.sub(r"\n{4,}", "\n\n\n", "\n\n\n".join(parts)) + "\n"
 
 
-REPEAT = dict.fromkeys(
-    LIBRARIES,
-    '''def _repeat(step, times, state):
-    """A state after a number of steps."""
-    for _ in range(times):
-        state = step(state)
-    return state''',
-) | {
-    "jax": '''def _repeat(step, times, state):
-    """A state after a number of steps; XLA runs them faster unrolled."""
-    return fori_loop(0, times, lambda _, now: step(now), state, unroll=True)'''
-}
-
-
 def _functions(machine: TensorMachine, backend: str) -> str:
-    """The functions of `tensor_functions` that the machine needs, and between them those that are noted."""
-    F, is_task = tensor_functions, machine.path is None
-    helpers = (F._array, F._first, F._last, F._spread, F._column, F._joined, F._picked, F._over, F._larger, F._sign, F._cross, F._norm)
-    dimensions = (F._flat, F._names)
-    forward = (F._solve, F._limited, F._moved_by, F._moved_slightly, F._pose, F.to_pose if is_task else F.to_joints)
-    if not is_task:
-        forward = (F._solve, F._limited, F._pose, F.to_joints)
-    completing = (F._completed, F._times, F._start_rotation, F._by_unset, F._unset_twist)
-    platform = F._platform_by_pose if is_task else F._platform_by_joints
-    if machine.completes:
-        platform = F._platform_completed
-    placing = (platform, *(completing if machine.completes else ()), *((F._feasible,) if is_task else ()))
-    asking = (F.pose, F.to_actuators, F.jacobian, F.with_jacobian, F.velocities, F.torques_to_coordinates)
-
-    def text(*functions: Any) -> str:
-        return "\n\n\n".join(inspect.getsource(function).strip("\n") for function in functions)
-
-    own_text = inspect.getsource(tensor_functions)
-    names = own_text[own_text.index("PARAMETER_NAMES = ") : own_text.index("@_cached")].strip("\n")
-    parts = [
-        text(F._Numbers),
-        "# --- Arrays whose first axes count numbers; those of the batch are behind them. ---",
-        text(*helpers, F._precision),
-        "# --- The machine's dimensions. ---",
-        text(*dimensions),
-        names,
-        PARAMETERS[backend],
-        text(F._own_home, F._given),
-        "# --- The legs, at poses in SIZE: steps of the library's own routines, which comments name. ---",
-        *noted_functions(machine),
-        "# --- Newton's method: a fixed number of steps, then one more that carries the derivatives. ---",
-        text(*forward),
-        "# --- Where the end effector is, and from there to the actuators. ---",
-        text(*placing).replace(platform.__name__, "_platform"),
-        _in_words(text(*asking, F.margins, F.margin), machine),
-    ]
-    return "\n\n\n".join(parts)
+    """The functions of `tensor_functions` that the machine needs, and before Newton's method those that are noted."""
+    source = inspect.getsource(tensor_functions)
+    blocks = source[source.index("class _Numbers") : source.index("_platform: Any")].strip("\n").split("\n\n\n")
+    unneeded = set() if machine.completes else set(COMPLETING)
+    unneeded |= BY_JOINTS if machine.path is None else BY_POSES
+    unneeded |= {"_platform_by_pose"} if machine.completes else set()
+    unneeded |= {"_repeat"} if backend == "jax" else set()
+    parts: list[str] = []
+    for block in blocks:
+        name = re.match(r"def (\w+)", block)
+        if name is not None and name[1] in unneeded:
+            continue
+        if block.startswith("# --- Newton's method"):
+            parts += [LEGS, *noted_functions(machine)]
+        if block.startswith("@_cached"):
+            parts.append(PARAMETERS[backend])
+        is_asked = name is not None and block.startswith(f"def {name[1]}(q") and not name[1].startswith("_")
+        parts.append(_in_words(block, machine) if is_asked else block)
+    return re.sub("_platform_(by_pose|by_joints|completed)", "_platform", "\n\n\n".join(parts))
 
 
-PARAMETERS = {
-    backend: f'''def parameters({"dtype=xp.float64, device=None" if backend == "torch" else "dtype=xp.float64"}):
+LEGS = "# --- The legs, at poses in SIZE: steps of the library's own routines, which comments name. ---"
+
+BY_JOINTS = {"to_joints", "_platform_by_joints"}
+BY_POSES = {"to_pose", "_moved_by", "_moved_slightly", "_platform_by_pose", "_feasible"}
+COMPLETING = {"_platform_completed", "_completed", "_times", "_start_rotation", "_by_unset", "_unset_twist"}
+"""Functions of files by joints, by poses, and of those that complete poses."""
+
+
+def _parameters(dtype: str, made: str) -> str:
+    return f'''def parameters({dtype}):
     """The dimensions as one vector; PARAMETER_NAMES says which is which."""
-    return xp.{"tensor(_PARAMETERS, dtype=dtype, device=device)" if backend == "torch" else "array(_PARAMETERS, dtype=dtype)"}'''
-    for backend in LIBRARIES
+    return xp.{made}'''
+
+
+PARAMETERS = dict.fromkeys(LIBRARIES, _parameters("dtype=xp.float64", "array(_PARAMETERS, dtype=dtype)")) | {
+    "torch": _parameters("dtype=xp.float64, device=None", "tensor(_PARAMETERS, dtype=dtype, device=device)")
 }
 
 
@@ -151,10 +129,13 @@ def noted_functions(machine: TensorMachine) -> Iterator[str]:
     given = leaves | {place: (v._replace(text=f"at.{v.text}"), k) for place, (v, k) in at.items()}
     body = Body(rates, given, names, "p_x", size)
     row_rates = placed.row_rates if is_task else []
-    lines = [*body.lines, f"rates = {_stacked(body, placed.rates)}", f"return rates, {_stacked(body, row_rates)}"]
+    order = body.order(row_rates)
+    lines = [*body.lines, f"rates = {_stacked(body, placed.rates)}", f"rows = {_stacked(body, row_rates, order)}"]
+    lines.append("return rates, rows")
     yield _function("_rates(h, R, p, at)", "Slopes of actuators, and of the legs' constraints, by a twist.", lines)
     body = Body(rooms, given, names, "p_x", size)
-    gaps = body.output(placed.gaps) if machine.closes else "None"
+    order = body.order([placed.gaps]) if machine.closes else []
+    gaps = body.output([placed.gaps[k] for k in order]) if machine.closes else "None"
     room = body.output(placed.rooms) if placed.rooms else "None"
     lines = [*body.lines, f"return {room}, {gaps}"]
     yield _function("_rooms(h, R, p, at)", "The room before every limit, and by how much legs are open.", lines)
@@ -164,8 +145,10 @@ def noted_functions(machine: TensorMachine) -> Iterator[str]:
         yield _function("_proximal(h, R, p)", "Coordinates of all proximal joints in closed form.", lines)
     for name, each, more, where in equations:
         body = Body([*each.rows, *(x for column in each.slopes for x in column)], leaves, names, "p_x", size)
-        lines = [*body.lines, f"return {body.output(each.rows)}, {_stacked(body, each.slopes)}"]
-        doc = f"Equations of legs {where}, and their slopes by a twist, then by proximal joints in z."
+        order = body.order([each.rows, *each.slopes])
+        rows, slopes = body.output([each.rows[k] for k in order]), _stacked(body, each.slopes, order)
+        lines = [*body.lines, f"rows = {rows}", f"return rows, {slopes}"]
+        doc = f"Equations of legs {where}; slopes by a twist, then by proximal joints in z."
         yield _function(f"{name}(h, R, p{more})", doc, lines)
 
 
@@ -235,13 +218,31 @@ def _function(head: str, doc: str, lines: Sequence[str]) -> str:
         rows = ", ".join(f"({', '.join(f'R_{a}{b}' for b in axes)})" for a in axes)
         unpacked += [f"{rows} = R"] if re.search(r"\bR_[xyz]{2}\b", text) else []
         unpacked += ["p_x, p_y, p_z = p"] if re.search(r"\bp_[xyz]\b", text) else []
-    return "\n    ".join([f"def {head}:", f'"""{doc}"""', *unpacked, *lines])
+    return "\n    ".join([f"def {head}:", f'"""{doc}"""', *unpacked, *map(_broken, lines)])
 
 
-def _stacked(body: Body, columns: Sequence[Sequence[Any]]) -> str:
+def _broken(line: str) -> str:
+    """A line, broken behind commas within brackets where it is long."""
+    parts, depth, start = [], 0, 0
+    for place, letter in enumerate(line):
+        depth += (letter in "([") - (letter in ")]")
+        if letter == "," and depth and line[place + 1 : place + 2] == " ":
+            parts.append(line[start : place + 1])
+            start = place + 2
+    rows = [""]
+    for part in (*parts, line[start:]):
+        if rows[-1] and len(rows[-1]) + len(part) > WIDEST:
+            rows.append("    ")
+        rows[-1] += part if rows[-1].strip() == "" else f" {part}"
+    return "\n    ".join(rows)
+
+
+def _stacked(body: Body, columns: Sequence[Sequence[Any]], order: Sequence[int] | None = None) -> str:
+    """The text of numbers by columns; of those in each, in an order of their own."""
     if not columns:
         return "None"
-    return "xp.stack((" + ", ".join(body.output(column) for column in columns) + "), 0)"
+    rows = range(len(columns[0])) if order is None else order
+    return "xp.stack((" + ", ".join(body.output([column[k] for k in rows]) for column in columns) + "), 0)"
 
 
 def _named(variables: Sequence[str]) -> str:
@@ -255,15 +256,15 @@ def _header(machine: TensorMachine, backend: str) -> str:
     """The comment at the top: units, coordinates, and the notice."""
     mechanism = machine.mechanism
     unit, library = mechanism.length_unit, LIBRARIES[backend]
-    what = "poses (4 x 4)" if machine.path is None else f"joints {', '.join(machine.path.names)}"
+    what = "poses (..., 4, 4)" if machine.path is None else f"joints {', '.join(machine.path.names)}, (..., n),"
     forward = "to_pose(actuators)" if machine.path is None else "to_joints(actuators)"
     argument = "target" if machine.path is None else "q"
     lines = [
         f"The kinematics of '{mechanism.name}' in {library}, written by pfabrik from its description.",
         "",
-        f"Between {what} and actuators {', '.join(mechanism.actuator_names)}:",
+        f"Between {what} and actuators {', '.join(mechanism.actuator_names)}, (..., n_a):",
         f"    to_actuators({argument}), {forward}, jacobian({argument}), margin({argument})",
-        f"Coordinates are {'targets (..., 4, 4), what the task leaves open completed' if argument == 'target' else 'those of the joints, (..., n)'}.",
+        *(["What the task leaves open of a pose is completed."] if machine.completes else []),
         f"Lengths in {unit}, angles in radians. Arrays may have any leading shape. What is computed has the type and",
         "the device of what is given. All of it is in the working mode of home.",
         "",
