@@ -55,7 +55,7 @@ IDEAS = {
         "answers.solution.Solution"
     ),
     "implementations of the legs' formulas": (
-        "kernels.legs.rods.place_rod exchange.export.tensor_tables.TensorMachine paper.geometric.struts tests.oracles"
+        "kernels.legs.rods.place_rod paper.geometric.struts tests.oracles"
     ),
     "viewers": "view.live.viewer.Viewer view.page.export_web.export_web",
     "searches for the border of a workspace": (
