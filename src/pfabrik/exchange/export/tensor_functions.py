@@ -150,18 +150,19 @@ def _solve(J, off):
     J is (n, m, ...), by the n unknowns first.
     """
     n, rank = len(J), ACCURACY[_precision(J)]
-    rows = [xp.concatenate([(J[i] * J[i:]).sum(1), -(J[i] * off).sum(0)[None]], 0) for i in range(n)]
-    sizes, upper, step = [row[0] for row in rows], [], [off[0]] * n
+    rows, step = [(J[i] * J[i:]).sum(1) for i in range(n)], [-(J[i] * off).sum(0) for i in range(n)]
+    sizes, shares = [row[0] for row in rows], []
     for k in range(n):
         is_free = rows[k][0] > rank * sizes[k]
-        share = rows[k][1:] * xp.where(is_free, 1.0 / xp.where(is_free, rows[k][0], 1.0), 0.0)
-        upper.append(share)
+        inverse = xp.where(is_free, 1.0 / xp.where(is_free, rows[k][0], 1.0), 0.0)
+        shares.append(inverse * rows[k])
+        step[k] = inverse * step[k]
         for i in range(k + 1, n):
-            rows[i] = rows[i] - rows[k][i - k] * share[i - k - 1 :]
+            rows[i] = rows[i] - rows[k][i - k] * shares[k][i - k :]
+            step[i] = step[i] - rows[k][i - k] * step[k]
     for k in reversed(range(n)):
-        step[k] = upper[k][-1]
         for i in range(k + 1, n):
-            step[k] = step[k] - upper[k][i - k - 1] * step[i]
+            step[k] = step[k] - shares[k][i - k] * step[i]
     return xp.stack(step)
 
 
