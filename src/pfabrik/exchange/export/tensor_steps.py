@@ -49,7 +49,7 @@ BINDS = {
 }
 """How closely a text binds."""
 
-WIDEST = 96
+WIDEST = 106
 """Columns of a line, as far as it can be."""
 
 

@@ -101,7 +101,7 @@ def _in_words(text: str, machine: TensorMachine) -> str:
 
 def noted_functions(machine: TensorMachine) -> Iterator[str]:
     """The functions that are steps of the machine's legs."""
-    placed, names, size = machine.placed, machine.names, machine.size
+    names, placed, size = machine.names, machine.placed, machine.size
     is_task = machine.path is None
     rates = [x for column in (*placed.rates, *(placed.row_rates if is_task else ())) for x in column]
     rooms = [*placed.rooms, *(placed.gaps if machine.closes else ())]
