@@ -51,11 +51,12 @@ test-processors: prepared
 		OPENBLAS_CORETYPE=$$core $(BIN)/python -m pytest -n auto --dist worksteal -m "not campaign" tests/test_docs.py \
 		tests/test_notebooks.py tests/test_transcripts.py || exit 1; done
 
-# Files of tensors in PyTorch and JAX, which are large: in an environment of their own.
+# Files of tensors in PyTorch and JAX, which are large: in an environment of their own. `make campaign` runs it, with all
+# machines (TENSORS='-m ""'); continuous integration does not, as it takes minutes to install.
 test-tensors: $(STAMP)
 	@$(BIN)/python -m venv .venv/tensors
 	@.venv/tensors/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[tensors]' hypothesis pytest scipy
-	@.venv/tensors/bin/python -m pytest tests/test_tensors.py
+	@.venv/tensors/bin/python -m pytest $(TENSORS) tests/test_tensors.py
 
 # The same tests with the kernels as plain Python: this run sees every line, so it measures coverage.
 test-interpreted: $(STAMP)
@@ -64,6 +65,7 @@ test-interpreted: $(STAMP)
 # Before a release, and where kernels have changed: the long random runs, and every property on many more examples.
 campaign: prepared
 	@PFABRIK_HYPOTHESIS=explore $(BIN)/python -m pytest -n auto --dist worksteal -m "campaign or hypothesis"
+	@$(MAKE) --no-print-directory test-tensors TENSORS='-m ""'
 
 check: $(STAMP)
 	$(BIN)/ruff check .

@@ -8,7 +8,7 @@ import importlib.util
 import warnings
 from functools import cache
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -276,7 +276,6 @@ def jax() -> Any:
         warnings.simplefilter("ignore")
         found = importlib.import_module("jax")
         found.config.update("jax_enable_x64", True)
-        importlib.import_module("jax.test_util")
     return found
 
 
@@ -293,7 +292,7 @@ def number_of(backend: str, dtype: str = "float64") -> Any:
 @pytest.mark.parametrize("name", ["g1_ankle", "stewart", "delta", "agile_eye", "tricept", "prr"])
 def test_tensors_answer_as_the_library_does(name: str, backend: str) -> None:
     for dtype in EXACT:
-        check_actuators(name, module(name, backend), number_of(backend, dtype), 100, dtype)
+        check_actuators(name, compiled(module(name, backend), backend), number_of(backend, dtype), 100, dtype)
 
 
 @pytest.mark.campaign
@@ -301,7 +300,12 @@ def test_tensors_answer_as_the_library_does(name: str, backend: str) -> None:
 @pytest.mark.parametrize("backend", ["numpy", "torch", "jax"])
 @pytest.mark.parametrize("name", NAMES)
 def test_tensors_answer_as_the_library_does_on_many_poses(name: str, backend: str, dtype: str) -> None:
-    check_actuators(name, module(name, backend), number_of(backend, dtype), 20_000, dtype)
+    check_actuators(name, compiled(module(name, backend), backend), number_of(backend, dtype), 20_000, dtype)
+
+
+def compiled(made: ModuleType, backend: str) -> Any:
+    """The functions of a file that are asked by many poses; JAX is asked as it is used."""
+    return SimpleNamespace(with_jacobian=jax().jit(made.with_jacobian)) if backend == "jax" else made
 
 
 def inside(name: str, joints: tuple[str, ...], count: int) -> np.ndarray:
@@ -315,61 +319,63 @@ def inside(name: str, joints: tuple[str, ...], count: int) -> np.ndarray:
     return targets[(margins[:, :n] > 1e-2).all(axis=1) & (margins > 0.0).all(axis=1)][:count]
 
 
-OVERCONSTRAINED = ("agile_eye",)
-GRADIENTS = [("g1_ankle", True), ("ankle_ups", True), ("delta", False), ("stewart", False), ("agile_eye", False)]
+OVERCONSTRAINED = ("agile_eye", "five_bar", "prr", "rpr", "rrr", "exechon", "planar_4rpr")
+"""Machines whose legs share what they hold, and other dimensions do not let move: no Jacobian by poses is near."""
+
+DIFFERENCED = [*((name, False) for name in NAMES), *((name, True) for name in SERIES if "tricept" not in name)]
+DIFFERENCED_JAX = [("g1_ankle", True), ("delta", False), ("stewart", False), ("agile_eye", False)]
 
 
-@pytest.mark.parametrize(("name", "by_joints"), GRADIENTS)
-def test_gradcheck_by_coordinates_and_parameters(name: str, by_joints: bool) -> None:
+def check_gradients(name: str, by_joints: bool, backend: str) -> None:
+    """Derivatives by the dimensions, of actuators and where they lead, are those of differences of the NumPy file."""
     joints = series(name) if by_joints else ("task",)
-    made, check = module(name, "torch", joints), torch().autograd.gradcheck
-    q = number_of("torch")(inside(name, joints, 1))
-    parameters = made.parameters().requires_grad_()
-    forward = made.to_joints if by_joints else made.to_pose
-    actuators = made.to_actuators(q).detach().requires_grad_()
-    settings = {"eps": 1e-6, "atol": 1e-4, "rtol": 1e-4}
-    if by_joints:  # entries of a pose are not free: numbers of a pose are differentiated in the test below
-        q.requires_grad_()
-    assert check(made.to_actuators, (q, parameters), **settings)
-    if by_joints:
-        assert check(made.jacobian, (q, parameters), **settings)
-    elif name not in OVERCONSTRAINED:  # whose legs other dimensions do not let move
-        assert check(lambda p: made.jacobian(q, p), (parameters,), **settings)
-    assert check(lambda a, p: forward(a, parameters=p), (actuators, parameters), **settings)
+    plain, made = module(name, joints=joints), module(name, backend, joints)
+    random, q = np.random.default_rng(6), inside(name, joints, 3)
+    p, actuators, forward = plain.parameters(), plain.to_actuators(q), "to_joints" if by_joints else "to_pose"
+    change = random.normal(size=len(p)) * plain.SIZE
+    for ask, given in (("to_actuators", q), ("jacobian", q), (forward, actuators)):
+        if ask == "jacobian" and not by_joints and name in OVERCONSTRAINED:
+            continue
+
+        def plainly(p: np.ndarray, ask: str = ask, given: np.ndarray = given) -> np.ndarray:
+            return np.asarray(getattr(plain, ask)(given, parameters=p))
+
+        weights = random.normal(size=plainly(p).shape)
+        step = 1e-6 * change
+        expected = ((plainly(p + step) - plainly(p - step)) * weights).sum() / 2e-6
+        array = number_of(backend)
+        at, factors = array(given), array(weights)
+
+        def weighted(p: Any, ask: str = ask, at: Any = at, factors: Any = factors) -> Any:
+            return (getattr(made, ask)(at, parameters=p) * factors).sum()
+
+        if backend == "jax":
+            gradient = jax().jit(jax().grad(weighted))(array(p))
+        else:
+            free = array(p).requires_grad_()
+            (gradient,) = torch().autograd.grad(weighted(free), free)
+        assert abs(np.asarray(gradient) @ change - expected) <= 1e-4 * np.abs(np.asarray(gradient) * change).sum(), ask
 
 
-@pytest.mark.parametrize(("name", "by_joints"), GRADIENTS)
-def test_the_jacobian_is_what_autograd_says(name: str, by_joints: bool) -> None:
-    """Of poses along the twists that the machine can make."""
-    joints = series(name) if by_joints else ("task",)
-    made, library = module(name, "torch", joints), torch()
-    q = number_of("torch")(inside(name, joints, 1)[0])
-    jacobian = made.jacobian(q)
-    if by_joints:
-        assert library.allclose(library.autograd.functional.jacobian(made.to_actuators, q), jacobian, rtol=1e-10)
-        return
-    pose = made.pose(q)
-
-    def at(twist: Any) -> Any:
-        w = twist[3:]
-        zero = 0.0 * w[0]
-        turn = library.stack(
-            [library.stack([zero, -w[2], w[1]]), library.stack([w[2], zero, -w[0]]), library.stack([-w[1], w[0], zero])]
-        )
-        upper = library.cat([pose[:3, :3] + turn @ pose[:3, :3], (pose[:3, 3] + twist[:3])[:, None]], -1)
-        return made.to_actuators(library.cat([upper, pose[3:]], 0))
-
-    found = library.autograd.functional.jacobian(at, library.zeros(6, dtype=library.float64))
-    feasible = jacobian @ library.linalg.pinv(jacobian) @ found if name == "delta" else found
-    scale = library.tensor([made.SIZE] * 3 + [1.0] * 3, dtype=library.float64)
-    if name == "stewart":
-        assert library.allclose(found * scale, jacobian * scale, rtol=1e-9)
-    else:  # along twists that the legs allow
-        allowed = library.linalg.pinv(jacobian * scale, rtol=1e-9) @ (jacobian * scale)
-        assert library.allclose(feasible * scale @ allowed, jacobian * scale @ allowed, rtol=1e-6, atol=1e-7)
+@pytest.mark.parametrize(("name", "by_joints"), DIFFERENCED)
+def test_gradients_in_pytorch_are_those_of_differences(name: str, by_joints: bool) -> None:
+    check_gradients(name, by_joints, "torch")
 
 
-@pytest.mark.parametrize(("name", "by_joints"), GRADIENTS[:4])
+@pytest.mark.parametrize(("name", "by_joints"), DIFFERENCED_JAX)
+def test_gradients_in_jax_are_those_of_differences(name: str, by_joints: bool) -> None:
+    check_gradients(name, by_joints, "jax")
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(("name", "by_joints"), [each for each in DIFFERENCED if each not in DIFFERENCED_JAX])
+def test_gradients_of_all_machines_in_jax_are_those_of_differences(name: str, by_joints: bool) -> None:
+    check_gradients(name, by_joints, "jax")
+
+
+@pytest.mark.parametrize(
+    ("name", "by_joints"), [("g1_ankle", True), ("ankle_ups", True), ("delta", False), ("stewart", False)]
+)
 def test_no_gradient_is_nan_at_and_beyond_dead_points(name: str, by_joints: bool) -> None:
     joints = series(name) if by_joints else ("task",)
     made = module(name, "torch", joints)
@@ -397,19 +403,12 @@ def test_no_gradient_is_nan_at_and_beyond_dead_points(name: str, by_joints: bool
         assert all(torch().isfinite(gradient).all() for gradient in gradients)
 
 
-@pytest.mark.parametrize(("name", "by_joints"), GRADIENTS[:3])
-def test_check_grads_of_jax_by_coordinates_and_parameters(name: str, by_joints: bool) -> None:
-    joints = series(name) if by_joints else ("task",)
-    made, check = module(name, "jax", joints), jax().test_util.check_grads
-    q, parameters = number_of("jax")(inside(name, joints, 1)), made.parameters()
-    forward = made.to_joints if by_joints else made.to_pose
-    actuators = made.to_actuators(q)
-    modes = {"order": 1, "modes": ("fwd", "rev"), "atol": 1e-4, "rtol": 1e-4, "eps": 1e-6}
-    check(lambda p: made.to_actuators(q, p), (parameters,), **modes)
-    check(lambda a, p: forward(a, parameters=p), (actuators, parameters), **modes)
-    if by_joints:
-        check(made.to_actuators, (q, parameters), **modes)
-    jitted = jax().jit(made.with_jacobian)(q)
-    np.testing.assert_allclose(jitted[0], actuators, rtol=1e-12)
-    one = jax().vmap(made.to_actuators)(q)
-    np.testing.assert_allclose(one, actuators, rtol=1e-12)
+def test_jax_maps_over_poses_and_differentiates_by_coordinates() -> None:
+    """By the joints of an ankle: the Jacobian is the derivative, forward and back."""
+    made = module("g1_ankle", "jax", series("g1_ankle"))
+    q = number_of("jax")(inside("g1_ankle", series("g1_ankle"), 3))
+    jacobian = jax().jit(made.jacobian)(q)
+    for derivative in (jax().jacfwd, jax().jacrev):
+        np.testing.assert_allclose(
+            jax().jit(jax().vmap(derivative(made.to_actuators)))(q), jacobian, rtol=1e-9, atol=1e-12
+        )

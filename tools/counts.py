@@ -54,9 +54,7 @@ IDEAS = {
         "engines.joints.close.Closing engines.joints.configurations.Configurations engines.pose.answers.LegAnswers "
         "answers.solution.Solution"
     ),
-    "implementations of the legs' formulas": (
-        "kernels.legs.rods.place_rod exchange.export.tensor_tables.TensorMachine paper.geometric.struts tests.oracles"
-    ),
+    "implementations of the legs' formulas": ("kernels.legs.rods.place_rod paper.geometric.struts tests.oracles"),
     "viewers": "view.page.export_web.web_page",
     "searches for the border of a workspace": (
         "capabilities.workspace.border_search.searched capabilities.workspace.border_search.sliced"

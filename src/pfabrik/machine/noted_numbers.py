@@ -265,7 +265,7 @@ class Formulas:
     def __init__(self, outputs: Sequence[Any], inputs: Sequence[Number], n_uniform: int) -> None:
         given = [number.place for number in inputs]
         at: dict[int | str, int] = dict.fromkeys(given, 0)
-        order = [each for each in _behind(outputs, lambda each: each.place in at) if each.place not in at]
+        order = [each for each in numbers_behind(outputs, lambda each: each.place in at) if each.place not in at]
         steps_of = [(each.place, each.trace.steps[each.place]) for each in order]
         self._order = [(place, operation, list(map(_name, parts))) for place, (operation, parts) in steps_of]
         results = [_name(each) for each in outputs]
@@ -341,10 +341,10 @@ def _name(number: Number | float) -> int | str:
 
 def uniform_parts(outputs: Sequence[Any]) -> list[Number]:
     """The numbers that are the same at all rows and that those which differ are computed from, or that are outputs."""
-    return [number for number in _behind(outputs, lambda each: not each.is_open) if not number.is_open]
+    return [number for number in numbers_behind(outputs, lambda each: not each.is_open) if not number.is_open]
 
 
-def _behind(outputs: Sequence[Any], is_end: Callable[[Number], bool]) -> list[Number]:
+def numbers_behind(outputs: Sequence[Any], is_end: Callable[[Number], bool]) -> list[Number]:
     """All numbers that outputs are computed from, these included, in the order of their places; none behind an end."""
     found: dict[int, Number] = {}
     waiting = [*outputs]

@@ -36,7 +36,7 @@ class PlacedLegs:
 
     def __init__(self, trace: Trace, table: LegTable, length: Number, *, has_sides: bool = False) -> None:
         """The legs of a table of numbers that note their steps, L among them."""
-        records = {name: _records(getattr(table, name), fields) for name, fields in table.fields.items()}
+        records = {name: noted_records(getattr(table, name), fields) for name, fields in table.fields.items()}
         legs, task = records["legs"], records["task"][0]
         n = len(legs)
         home = [[float(i == j) for j in range(3)] + [float(task["reference"][i]) * float(length)] for i in range(3)]
@@ -119,7 +119,7 @@ def open_motions(table: LegTable, rotations: Floats, n_implicit: int) -> Floats:
     return motions
 
 
-def _records(array: Any, fields: Sequence[Fields]) -> Any:
+def noted_records(array: Any, fields: Sequence[Fields]) -> Any:
     """An array of records as mappings, with what they were filled from where that notes its steps."""
     made = np.empty(len(array), object)
     for row, (record, given) in enumerate(zip(array, fields, strict=True)):

@@ -1,32 +1,22 @@
-"""The text of a file of tensors: comment, dimensions, tables, and the routines that the machine needs."""
+"""The text of a file of tensors: comment, dimensions, what is noted of the legs, and the functions that ask them."""
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Iterator, Sequence
 from importlib import resources
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ...machine.description.mechanism import Mechanism
+from ...machine.noted_numbers import numbers_behind
+from . import tensor_functions
 from .source import NOTICE, selected
 from .static_data import comment
-from .tensor_tables import Rows, TensorMachine, cones_of, counting_of, dimensions_of, nested, place_of
+from .tensor_machine import TensorMachine
+from .tensor_steps import WIDEST, Body, Places, Variable
 
-ACCURACY = {"float64": 1e-13, "float32": 1e-6}
-"""Share of a pivot below which equations do not determine an unknown: what rounding leaves of it."""
-
-CLOSED = {"float64": 1e-9, "float32": 1e-4}
-"""What legs may be open and count as closed [L or rad]."""
-
-DEAD = 1e-12
-"""Square of the sine of an angle from a dead point below which a proximal joint is clamped."""
-
-KEPT = 1e-9
-"""Excess up to which an angle counts as within its range [rad]."""
-
-LONGEST = 120
+LIBRARIES = {"numpy": "NumPy", "torch": "PyTorch", "jax": "JAX"}
 
 
 class Steps(NamedTuple):
@@ -38,83 +28,243 @@ class Steps(NamedTuple):
 
 def tensor_text(machine: TensorMachine, backend: str, steps: Steps) -> str:
     """The text of the file."""
-    folder = resources.files(__package__)
-    routines = folder.joinpath("tensors.py.in").read_text(encoding="utf-8")
-    head = selected(folder.joinpath("tensor_backends.py.in").read_text(encoding="utf-8"), {backend.upper()})
-    text = _in_words(selected(routines, _conditions(machine)), machine, backend)
-    parts = [_header(machine, backend), head.strip("\n"), "\n".join(_tables(machine, steps)), text.strip("\n")]
-    return re.sub(r"\n{4,}", "\n\n\n", "\n\n".join(parts)) + "\n"
+    head = resources.files(__package__).joinpath("tensor_backends.py.in").read_text(encoding="utf-8")
+    parts = [
+        _header(machine, backend),
+        selected(head, {backend.upper()}).strip("\n"),
+        "\n".join(_tables(machine, steps)),
+        _functions(machine, backend),
+    ]
+    return re.sub(r"\n{4,}", "\n\n\n", "\n\n\n".join(parts)) + "\n"
 
 
-def _conditions(machine: TensorMachine) -> set[str]:
-    """The names of conditions in the routines that hold."""
-    kinds = [group.kind for group in machine.groups]
-    rods = [kind for kind in kinds if kind["kind"] == "rod"]
-    is_task = machine.path is None
-    proximal = {kind["proximal"] for kind in kinds}
-    endings = [kind[f"{end}_end"] for kind in rods for end in ("base", "platform")]
-    conditions = {
-        "TASK": is_task,
-        "JOINTS": not is_task,
-        "CLOSES": is_task and machine.machine.equations > 0,
-        "COMPLETES": machine.completes,
-        "POINT": machine.is_point and is_task,
-        "PROXIMAL": proximal != {None},
-        "CRANKS": "crank" in proximal,
-        "CARRIAGES": "carriage" in proximal,
-        "SHARED": any(kind["main"] for kind in kinds),
-        "PIVOTS": len(rods) < len(kinds),
-        "TWISTS": is_task and any(kind["twists"] for kind in rods),
-        "HINGED": is_task and "hinge" in endings,
-        "ANGLES": len(machine.machine.limited) > 0 or any(kind["twists"] for kind in rods),
-        "DRIVEN_HINGES": any(place[2] in ("base", "platform") for place in machine.driven),
-    }
-    return {name for name, holds in conditions.items() if holds}
+def _functions(machine: TensorMachine, backend: str) -> str:
+    """The functions of `tensor_functions` that the machine needs, and before Newton's method those that are noted."""
+    source = inspect.getsource(tensor_functions)
+    blocks = source[source.index("class _Numbers") : source.index("_platform: Any")].strip("\n").split("\n\n\n")
+    unneeded = set() if machine.completes else set(COMPLETING)
+    unneeded |= BY_JOINTS if machine.path is None else BY_POSES
+    unneeded |= {"_platform_by_pose"} if machine.completes else set()
+    unneeded |= {"_repeat"} if backend == "jax" else set()
+    parts: list[str] = []
+    for block in blocks:
+        name = re.match(r"def (\w+)", block)
+        if name is not None and name[1] in unneeded:
+            continue
+        if block.startswith("# --- Newton's method"):
+            parts += [LEGS, *noted_functions(machine)]
+        if block.startswith("@_cached"):
+            parts.append(PARAMETERS[backend])
+        is_asked = name is not None and block.startswith(f"def {name[1]}(q") and not name[1].startswith("_")
+        parts.append(_in_words(block, machine) if is_asked else block)
+    return re.sub("_platform_(by_pose|by_joints|completed)", "_platform", "\n\n\n".join(parts))
 
 
-def _in_words(text: str, machine: TensorMachine, backend: str) -> str:
-    """The routines, with the words for what their arguments are."""
+LEGS = "# --- The legs, at poses in SIZE: steps of the library's own routines, which comments name. ---"
+
+BY_JOINTS = {"to_joints", "_platform_by_joints"}
+BY_POSES = {"to_pose", "_moved_by", "_moved_slightly", "_platform_by_pose", "_feasible"}
+COMPLETING = {"_platform_completed", "_completed", "_times", "_start_rotation", "_by_unset", "_unset_twist"}
+"""Functions of files by joints, by poses, and of those that complete poses."""
+
+
+def _parameters(dtype: str, made: str) -> str:
+    return f'''def parameters({dtype}):
+    """The dimensions as one vector; PARAMETER_NAMES says which is which."""
+    return xp.{made}'''
+
+
+PARAMETERS = dict.fromkeys(LIBRARIES, _parameters("dtype=xp.float64", "array(_PARAMETERS, dtype=dtype)")) | {
+    "torch": _parameters("dtype=xp.float64, device=None", "tensor(_PARAMETERS, dtype=dtype, device=device)")
+}
+
+
+def _in_words(text: str, machine: TensorMachine) -> str:
+    """Text of functions that take coordinates, with the words for these."""
     is_task = machine.path is None
     words = {
-        "ARGUMENT_IS": "targets (..., 4, 4), what the task leaves open completed"
-        if is_task
-        else "joint coordinates (..., n)",
-        "ARGUMENT": "target" if is_task else "q",
-        "JACOBIAN_BY": "the twist of the end effector, (..., n_a, 6), or by the nearest one that the legs allow:\n"
+        r"\bq\b": "target" if is_task else "q",
+        "RATES_BY": "the twist of the end effector, (..., n_a, 6), or by the nearest one that the legs allow:\n"
         "    velocity of the reference point, angular velocity, in base coordinates"
         if is_task
         else "those of the joints, (..., n_a, n)",
-        "RATES_OF": "of the end effector, twists (..., 6)" if is_task else "of the joints (..., n)",
-        "TORQUES_NAME": "torques_to_wrenches" if is_task else "torques_to_joints",
+        "torques_to_coordinates": "torques_to_wrenches" if is_task else "torques_to_joints",
         "TORQUES_AT": "the end effector, as forces and moments (..., 6)" if is_task else "the joints (..., n)",
-        "PARAMETERS_OF": {
-            "numpy": "dtype=xp.float64",
-            "torch": "dtype=xp.float64, device=None",
-            "jax": "dtype=xp.float64",
-        }[backend],
-        "MAKE_PARAMETERS": {
-            "numpy": "xp.array(_PARAMETERS, dtype=dtype)",
-            "torch": "xp.tensor(_PARAMETERS, dtype=dtype, device=device)",
-            "jax": "xp.array(_PARAMETERS, dtype=dtype)",
-        }[backend],
     }
     for word, meant in words.items():
-        text = text.replace(word, meant)
+        text = re.sub(word, meant, text)
     return text
+
+
+# The functions that are noted
+
+
+def noted_functions(machine: TensorMachine) -> Iterator[str]:
+    """The functions that are steps of the machine's legs."""
+    names, placed, size = machine.names, machine.placed, machine.size
+    is_task = machine.path is None
+    rates = [x for column in (*placed.rates, *(placed.row_rates if is_task else ())) for x in column]
+    rooms = [*placed.rooms, *(placed.gaps if machine.closes else ())]
+    equations = [("_equations", machine.forward, ", actuators, z", "at values of actuators")]
+    if machine.completes:
+        equations.append(("_closing", machine.closing, ", z", "at coordinates of all proximal joints"))
+    walked = [] if is_task else [*machine.walked[0], *(x for row in machine.walked[1] for x in row)]
+    proximal = machine.proximal_places if machine.completes else []
+    everything = [*placed.actuators, *rates, *rooms, *proximal, *walked]
+    everything += [x for _, each, *_ in equations for part in (each.rows, *each.slopes) for x in part]
+    home, places = _home(machine, everything)
+    yield home
+    leaves = places | _leaves(machine)
+    if not is_task:
+        yield _walked(machine, leaves)
+
+    behind = {each.place for each in numbers_behind(placed.actuators, lambda each: each.place in leaves)}
+    later = numbers_behind([*rates, *rooms], lambda each: each.place in leaves or each.place in behind)
+    kept = [each for each in later if each.place in behind and each.place not in leaves]
+    body = Body(placed.actuators, leaves, names, "p_x", size, kept)
+    at = {each.place: body.places[each.place] for each in kept}
+    variables = list(dict.fromkeys(variable.text for variable, _ in at.values()))
+    lines = [*body.lines, f"return {body.output(placed.actuators)}, _Numbers({_named(variables)})"]
+    yield _function("_placed(h, R, p)", "Actuators in closed form, and numbers of the legs there.", lines)
+    given = leaves | {place: (v._replace(text=f"at.{v.text}"), k) for place, (v, k) in at.items()}
+    body = Body(rates, given, names, "p_x", size)
+    row_rates = placed.row_rates if is_task else []
+    order = body.order(row_rates)
+    lines = [*body.lines, f"rates = {_stacked(body, placed.rates)}", f"rows = {_stacked(body, row_rates, order)}"]
+    lines.append("return rates, rows")
+    yield _function("_rates(h, R, p, at)", "Slopes of actuators, and of the legs' constraints, by a twist.", lines)
+    body = Body(rooms, given, names, "p_x", size)
+    order = body.order([placed.gaps]) if machine.closes else []
+    gaps = body.output([placed.gaps[k] for k in order]) if machine.closes else "None"
+    room = body.output(placed.rooms) if placed.rooms else "None"
+    lines = [*body.lines, f"return {room}, {gaps}"]
+    yield _function("_rooms(h, R, p, at)", "The room before every limit, and by how much legs are open.", lines)
+    if proximal:
+        body = Body(proximal, leaves, names, "p_x", size)
+        lines = [*body.lines, f"return {body.output(proximal)}"]
+        yield _function("_proximal(h, R, p)", "Coordinates of all proximal joints in closed form.", lines)
+    for name, each, more, where in equations:
+        body = Body([*each.rows, *(x for column in each.slopes for x in column)], leaves, names, "p_x", size)
+        order = body.order([each.rows, *each.slopes])
+        rows, slopes = body.output([each.rows[k] for k in order]), _stacked(body, each.slopes, order)
+        lines = [*body.lines, f"rows = {rows}", f"return rows, {slopes}"]
+        doc = f"Equations of legs {where}; slopes by a twist, then by proximal joints in z."
+        yield _function(f"{name}(h, R, p{more})", doc, lines)
+
+
+def _home(machine: TensorMachine, everything: Sequence[Any]) -> tuple[str, Places]:
+    """The function of what follows from dimensions, and where its numbers are."""
+    inputs, raw = _inputs(machine)
+    more = {"reference": machine.reference, "joint_homes": machine.joint_homes}
+    wanted = numbers_behind([*everything, *machine.reference], lambda each: not each.is_open)
+    used = [each for each in wanted if not each.is_open]
+    body = Body([], inputs, machine.names, "n[0]", machine.size, used)
+    variables = {each.place: body.places[each.place] for each in used}
+    named = {variable.text: raw.get(variable.text, variable.text) for variable, _ in variables.values()}
+    made = [f"{name}={text}" for text, name in named.items()]
+    made += [f"{name}={body.output(numbers)}" for name, numbers in more.items() if numbers]
+    lines = [*body.lines, f"return _Numbers({', '.join(made)})"]
+    places = {place: (v._replace(text=f"h.{named[v.text]}"), k) for place, (v, k) in variables.items()}
+    return _function("_home(n)", "What follows from dimensions alone, of all legs.", lines), places
+
+
+def _inputs(machine: TensorMachine) -> tuple[Places, dict[str, str]]:
+    """Where the machine's numbers are in the vector of all of them; and the names of its parts, by their texts.
+
+    A part is one component of legs that are alike, or of what else has rows.
+    """
+    places: Places = {}
+    names: dict[str, str] = {}
+    start = 0
+    for name, numbers in (*machine.given, *machine.constants):
+        rows = numbers.reshape(1, -1) if name == "reference_point" else numbers.reshape(len(numbers), -1)
+        n, width = rows.shape
+        end = start + n * width
+        for column in range(width):
+            step = f":{width}" if n > 1 and width > 1 else ""
+            text = f"n[{start + column}:{end if n > 1 else start + column + 1}{step}]"
+            letter = f"_{'xyz'[column % 3]}" if width > 1 else ""
+            names[text] = f"{name}_{column // 3}{letter}" if width > 3 else f"{name}{letter}"
+            places |= {x.place: (Variable(text, n, False), k) for k, x in enumerate(rows[:, column])}
+        start = end
+    return places, names
+
+
+def _leaves(machine: TensorMachine) -> Places:
+    """Where the numbers of a pose, and given coordinates, are."""
+    axes = "xyz"
+    leaves = {x.place: (Variable(f"R_{axes[k // 3]}{axes[k % 3]}", 1, True), 0) for k, x in enumerate(machine.R)}
+    leaves |= {x.place: (Variable(f"p_{axes[k]}", 1, True), 0) for k, x in enumerate(machine.p)}
+    for name in ("actuators", "joints", "proximal"):
+        numbers = getattr(machine, name)
+        text = {"actuators": "actuators", "joints": "q", "proximal": "z"}[name]
+        leaves |= {x.place: (Variable(text, len(numbers), True), k) for k, x in enumerate(numbers)}
+    return leaves
+
+
+def _walked(machine: TensorMachine, leaves: Places) -> str:
+    pose, twists = machine.walked
+    body = Body([*pose, *(x for row in twists for x in row)], leaves, machine.names, "q[0]", machine.size)
+    R = [pose[3 * row : 3 * row + 3] for row in range(3)]
+    lines = [*body.lines, f"R, p = {_stacked(body, R)}, {body.output(pose[9:])}"]
+    lines.append(f"return R, p, {_stacked(body, twists)}")
+    return _function("_walked(h, q)", "Rotation and position at joint coordinates, and the twist by each.", lines)
+
+
+def _function(head: str, doc: str, lines: Sequence[str]) -> str:
+    text = "\n".join(lines)
+    axes, unpacked = "xyz", []
+    if "R, p" in head:
+        rows = ", ".join(f"({', '.join(f'R_{a}{b}' for b in axes)})" for a in axes)
+        unpacked += [f"{rows} = R"] if re.search(r"\bR_[xyz]{2}\b", text) else []
+        unpacked += ["p_x, p_y, p_z = p"] if re.search(r"\bp_[xyz]\b", text) else []
+    return "\n    ".join([f"def {head}:", f'"""{doc}"""', *unpacked, *map(_broken, lines)])
+
+
+def _broken(line: str) -> str:
+    """A line, broken behind commas within brackets where it is long."""
+    parts, depth, start = [], 0, 0
+    for place, letter in enumerate(line):
+        depth += (letter in "([") - (letter in ")]")
+        if letter == "," and depth and line[place + 1 : place + 2] == " ":
+            parts.append(line[start : place + 1])
+            start = place + 2
+    rows = [""]
+    for part in (*parts, line[start:]):
+        if rows[-1] and len(rows[-1]) + len(part) > WIDEST:
+            rows.append("    ")
+        rows[-1] += part if rows[-1].strip() == "" else f" {part}"
+    return "\n    ".join(rows)
+
+
+def _stacked(body: Body, columns: Sequence[Sequence[Any]], order: Sequence[int] | None = None) -> str:
+    """The text of numbers by columns; of those in each, in an order of their own."""
+    if not columns:
+        return "None"
+    rows = range(len(columns[0])) if order is None else order
+    return "xp.stack((" + ", ".join(body.output([column[k] for k in rows]) for column in columns) + "), 0)"
+
+
+def _named(variables: Sequence[str]) -> str:
+    return ", ".join(f"{each}={each}" for each in variables)
+
+
+# The top of a file
 
 
 def _header(machine: TensorMachine, backend: str) -> str:
     """The comment at the top: units, coordinates, and the notice."""
     mechanism = machine.mechanism
-    unit, library = mechanism.length_unit, {"numpy": "NumPy", "torch": "PyTorch", "jax": "JAX"}[backend]
-    what = "poses (4 x 4)" if machine.path is None else f"joints {', '.join(machine.path.names)}"
+    unit, library = mechanism.length_unit, LIBRARIES[backend]
+    what = "poses (..., 4, 4)" if machine.path is None else f"joints {', '.join(machine.path.names)}, (..., n),"
     forward = "to_pose(actuators)" if machine.path is None else "to_joints(actuators)"
     argument = "target" if machine.path is None else "q"
     lines = [
         f"The kinematics of '{mechanism.name}' in {library}, written by pfabrik from its description.",
         "",
-        f"Between {what} and actuators {', '.join(mechanism.actuator_names)}:",
+        f"Between {what} and actuators {', '.join(mechanism.actuator_names)}, (..., n_a):",
         f"    to_actuators({argument}), {forward}, jacobian({argument}), margin({argument})",
+        *(["What the task leaves open of a pose is completed."] if machine.completes else []),
         f"Lengths in {unit}, angles in radians. Arrays may have any leading shape. What is computed has the type and",
         "the device of what is given. All of it is in the working mode of home.",
         "",
@@ -137,115 +287,48 @@ def _without_clearance(mechanism: Mechanism) -> list[str]:
 
 def _tables(machine: TensorMachine, steps: Steps) -> Iterator[str]:
     """Constants and tables."""
-    mechanism, size = machine.mechanism, machine.mechanism.characteristic_length
-    inner, path = machine.machine, machine.path
+    mechanism, inner, path = machine.mechanism, machine.machine, machine.path
     yield f"ACTUATORS = {_words(mechanism.actuator_names)}"
     if path is not None:
         yield f"JOINTS = {_words(path.names)}"
-    yield from _limit_names(machine)
+    yield f"LIMITS = {_words(machine.limit_names)}"
     yield f"LENGTH_UNIT = {str(mechanism.length_unit)!a}"
-    yield f"SIZE = {size!r}  # a length of the machine, by which lengths are compared with angles"
+    yield f"SIZE = {machine.size!r}  # a length of the machine, by which lengths are compared with angles"
     yield f"STEPS = {steps.forward}  # of Newton's method, for forward kinematics"
     if machine.completes:
         yield f"COMPLETING_STEPS = {steps.completing}  # for what the task leaves open"
     yield ""
-    yield from _dimensions(machine)
-    yield "# --- How the machine is built. ---"
-    yield ""
-    yield "GROUPS = {"
-    for group in machine.groups:
-        joints = "; ".join(", ".join(inner.legs[place].joints) for place in group.legs)
-        yield f"    {group.name!r}: {{  # {comment(joints)}"[:LONGEST]
-        yield from (f"        {key!r}: {value!r}," for key, value in group.kind.items())
-        yield "    },"
-    yield "}"
-    yield "# of every actuator: the group, the leg there, what moves, which of these; its sense; how turns are counted"
-    yield f"ACTUATED = {_rows(machine.driven)}"
-    yield f"ACTUATOR_SENSE = {nested([driven.sense for driven in inner.driven])!r}"
-    yield f"ACTUATOR_COUNTING = {_rows([counting_of(driven) for driven in inner.driven])}"
-    ranged = [(place_of(c, inner, machine.groups), c.sense, counting_of(c)) for c in inner.limited]
-    yield f"RANGED = {_rows(ranged)}"
-    yield f"CONES = {_rows(list(cones_of(machine.machine, machine.groups)))}"
-    yield f"DEAD_POINTS = {_rows(_dead_points(machine))}"
-    yield f"OPEN = {machine.open!r}  # proximal joints without a motor"
-    if path is not None:
-        series = [(motion.place, motion.sign, motion.kind == "turn") for motion in path.motions]
-        units = nested([1.0 if each.kind == "angle" else size for each in path.coordinates])
-        yield "# from the base outward: the place of the coordinate, its sense, and if it turns"
-        yield f"SERIES = {_rows(series)}"
-        yield f"JOINT_UNITS = {units!r}"
-    else:
-        yield f"MOTIONS = {_rows(nested(np.eye(6)[:, :3])) if machine.is_point else None}  # of the pose; None: all"
-        yield f"FIXED = {3 if machine.is_point else 0}  # of the six that a pose has"
-    if machine.completes:
-        yield f"ALL_PROXIMAL = {machine.proximal!r}"
-        yield f"ROTATIONS = {inner.rotations}  # of the pose's three that the task sets"
-        yield f"SET_AXES = {nested(inner.axes)!r}  # 1: the task sets x, y, z"
-        yield f"UNSET_MOTIONS = {_rows(_unset(machine))}"
-    is_angle_driven = any(place[2] in ("base", "platform") for place in machine.driven)
-    yield f"CLOSING = {path is None}  # all legs' equations are solved, not those of actuators alone"
-    yield f"CLOSES = {path is None and inner.equations > 0}"
-    yield f"DRIVEN_ANGLES = {is_angle_driven}"
-    yield "HINGES = {'hinge': 1, 'cross': 2}"
-    yield f"ACCURACY = {ACCURACY!r}"
-    yield f"CLOSED = {CLOSED!r}"
-    yield f"DEAD, KEPT = {DEAD!r}, {KEPT!r}"
-    yield "TURN = 6.283185307179586"
-    yield "UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))"
-
-
-def _unset(machine: TensorMachine) -> Rows:
-    """The motions of a pose that the task leaves open, but a turn about its own z axis."""
-    inner, unit = machine.machine, np.eye(6)
-    columns = [axis for axis in range(3) if not inner.axes[axis]] + ([3, 4, 5] if inner.rotations == 0 else [])
-    return nested(unit[:, columns])
-
-
-def _limit_names(machine: TensorMachine) -> Iterator[str]:
-    names = [f"{joint} {bound}" for joint, bound in machine.machine.limits]
-    for name, leg in _dead_points(machine):
-        group = next(group for group in machine.groups if group.name == name)
-        joints = machine.machine.legs[group.legs[leg]].joints
-        names.append(f"dead point of {joints[0]}")
-    if machine.path is None and machine.machine.equations:
-        names.append("legs do not close")
-    yield f"LIMITS = {_words(names)}"
-
-
-def _dead_points(machine: TensorMachine) -> list[tuple[str, int]]:
-    """Legs that have a singularity margin: on a proximal joint of their own, or pivots of three hinges."""
-    return [(group.name, leg) for group in machine.groups if "side" in group.kind for leg in range(group.kind["n"])]
-
-
-def _dimensions(machine: TensorMachine) -> Iterator[str]:
-    """The dimensions, a line for every leg."""
-    inner = machine.machine
-    rows = dimensions_of(inner, machine.groups, machine.path)
-    joints = {group.name: [", ".join(inner.legs[place].joints) for place in group.legs] for group in machine.groups}
-    joints["actuators"] = list(machine.mechanism.actuator_names)
-    if machine.path is not None:
-        names = machine.path.names
-        joints["joints"] = [names[motion.place] for motion in machine.path.motions]
     yield "DIMENSIONS = {"
-    for name, values in rows.items():
-        of = joints.get(name.rpartition(".")[0], [])
-        if name == "joints.home":
-            of = list(machine.path.names) if machine.path else []
+    for name, values, of in machine.dimensions:
         if not of:
-            yield f"    {name!r}: {values!r},"
+            yield f"    {name!r}: {_rows(values)!r},"
             continue
         yield f"    {name!r}: ("
-        assert isinstance(values, tuple)
-        yield from (f"        {row!r},  # {comment(each)}" for row, each in zip(values, of, strict=True))
+        yield from (f"        {_rows(row)!r},  # {comment(each)}" for row, each in zip(values, of, strict=True))
         yield "    ),"
     yield "}"
-    yield ""
+    constants = [float(x) for _, numbers in machine.constants for x in numbers]
+    yield f"_CONSTANTS = {tuple(constants)!r}  # of legs: sides, senses, bounds"
+    yield f"N_OPEN = {len(machine.open_columns)}  # proximal joints without a motor"
+    units = machine.rate_units
+    yield f"RATE_UNITS = {_rows(units.tolist()) if (units != 1.0).any() else None!r}"
+    if path is not None:
+        yield f"JOINT_UNITS = {tuple(1.0 if is_angle else machine.size for is_angle in path.is_angle)!r}"
+    else:
+        yield f"N_MOTIONS = {3 if machine.is_point else 6}  # of the pose"
+    if machine.completes:
+        yield f"N_PROXIMAL = {len(machine.proximal)}"
+        yield f"ROTATIONS = {inner.rotations}  # of the pose's three that the task sets"
+        yield f"SET_AXES = {tuple(map(float, inner.axes))!r}  # 1: the task sets x, y, z"
+    yield f"ACCURACY = {tensor_functions.ACCURACY!r}"
+    yield f"CLOSED = {tensor_functions.CLOSED!r}"
+    yield f"UNIT = {tensor_functions.UNIT!r}"
 
 
 def _words(names: Sequence[str]) -> str:
     return "(" + "".join(f"{name!a}, " for name in names).rstrip() + ")"
 
 
-def _rows(rows: Any) -> str:
-    """A tuple of rows, one a line."""
-    return "(" + "".join(f"\n    {row!a}," for row in rows) + ("\n)" if len(rows) else ")")
+def _rows(values: Any) -> Any:
+    """Numbers, nested in tuples."""
+    return tuple(map(_rows, values)) if isinstance(values, list) else values

@@ -13,7 +13,7 @@ from ...common.arrays import Floats
 from ...common.checks import require_choice, require_names
 from ...common.whole_files import whole_path
 from ...machine.description.mechanism import Mechanism, checked_mechanism
-from .tensor_tables import TensorMachine
+from .tensor_machine import TensorMachine
 from .tensor_text import Steps, tensor_text
 
 N_TRIED = 400
@@ -28,6 +28,9 @@ ENOUGH = 0.995
 
 CLOSING = ("dead point", "legs do not close")
 """What names of limits begin with that no range is."""
+
+FEWEST_FORWARD = 1
+"""Steps before the one that carries derivatives: these are right where its own length is 0."""
 
 FEWEST_COMPLETING = 2
 """Steps by which a pose is completed at other dimensions too, where legs do not close at once as they do at home's."""
@@ -59,7 +62,8 @@ def steps_of(machine: TensorMachine) -> Steps:
 
     size = max(machine.mechanism.characteristic_length, 1.0)
     completing = max(FEWEST_COMPLETING, _fewest(complete, size, 1.0) + 1) if machine.completes else 0
-    return Steps(_fewest(lambda steps: forward(values, steps=steps), size, ENOUGH), completing)
+    found = _fewest(lambda steps: forward(values, steps=steps), size, ENOUGH)
+    return Steps(max(FEWEST_FORWARD, found), completing)
 
 
 def _fewest(answer: Callable[[int], Floats], size: float, enough: float) -> int:

@@ -248,6 +248,17 @@ def proximal_rate(proximal: Record, base_end: Vec, a: Vec, b: Vec) -> float:
 
 
 @routine
+def clamped_rate(rod: Record, platform_end: Vec, values: Floats) -> Vec:
+    """Derivative by the platform end of a proximal coordinate that does not reach it, but comes nearest."""
+    axis = vec(rod["proximal_axis"])
+    if rod["proximal"] == CARRIAGE:
+        return axis
+    point = vec(rod["proximal_point"])
+    lever = sub(base_end_of(rod, rod, values), point)
+    return scale(1.0 / dot(lever, sub(platform_end, point)), cross(axis, lever))
+
+
+@routine
 def put_proximal_slope(rod: Record, frame: Floats, values: Floats, u: Vec, proximal_slopes: Floats) -> None:
     """Derivative (6,) of the proximal coordinate that keeps the rod's length."""
     put_pose_slope(rod, frame, u, ZERO, proximal_slopes)
