@@ -10,13 +10,12 @@ import numpy as np
 
 from ...common.arrays import Floats, Record
 from ...common.checks import require_names
-from ...common.rotations import nearest_turn, square_to
+from ...common.rotations import nearest_turn
 from ...engines.joints.parasitic import has_other_assemblies
 from ...engines.pose.links_of_legs import keeps_links
 from ...errors import UnsupportedMechanism
 from ...kernels.legs import records as K
 from ...kinematics import JointPath, generic_of, joint_path, model_of, require_determined
-from ...machine.decomposition.leg_forms import RedundantJoint, Rod
 from ...machine.decomposition.leg_table import LegTable
 from ...machine.description.mechanism import Mechanism
 from ...machine.moved_bodies import Motion, MovedBodies
@@ -78,13 +77,11 @@ class ExportedLeg(NamedTuple):
     ----------
     main : the leg whose proximal joint it is on; its own place if it shares none.
     record : as in `LegTable.legs`; lengths in L.
-    numbers : constants by the name of their field in a file of tensors, in the mechanism's unit.
     size : L [length].
     """
 
     main: int
     record: Record
-    numbers: dict[str, Number]
     joints: tuple[str, ...]
     size: float
 
@@ -225,52 +222,6 @@ def _legs(mechanism: Mechanism, table: LegTable) -> list[ExportedLeg]:
     first, length = 0, mechanism.characteristic_length
     for place, (form, record) in enumerate(zip(table.forms, table.legs, strict=True)):
         first = first if record["proximal"] == K.SHARED else place
-        if isinstance(form, Rod):
-            numbers = _rod_numbers(form, record, length)
-        else:
-            numbers = (_redundant_numbers if isinstance(form, RedundantJoint) else _pivot_numbers)(record, length)
         joints = tuple(dict.fromkeys(element.joint.name for element in form.elements))
-        legs.append(ExportedLeg(first, record, numbers, joints, length))
+        legs.append(ExportedLeg(first, record, joints, length))
     return legs
-
-
-def _rod_numbers(rod: Rod, record: Record, length: float) -> dict[str, Number]:
-    """The constants of a rod; `reach` is from the crank, or the base end on a carriage, to the platform end."""
-    numbers: dict[str, Number] = {
-        "base_end": record["base_end_point"] * length,
-        "platform_end": record["platform_end_point"] * length,
-    }
-    numbers |= {name: record[name] for name in ("line", "base_end_side", "platform_end_side", "twist")}
-    numbers |= {
-        f"{end}_axes": record[f"{end}_axes"]
-        for end in ("base_end", "platform_end")
-        if record[end] in (K.HINGE, K.CROSS)
-    }
-    numbers["length"] = record["length"] * length
-    if rod.proximal is not None:
-        numbers |= {
-            "axis": record["proximal_axis"],
-            "side": record["side"],
-            "reach": (record["crank"] + record["length"] * record["line"]) * length,
-        }
-        fields = {"centre": "proximal_point", "crank": "crank", "across": "crank_across"}
-        numbers |= {name: record[field] * length for name, field in fields.items()}
-    return numbers
-
-
-def _redundant_numbers(record: Record, length: float) -> dict[str, Number]:
-    return {"axis": record["proximal_axis"], "centre": record["proximal_point"] * length, "side": record["side"]}
-
-
-def _pivot_numbers(record: Record, length: float) -> dict[str, Number]:
-    slides, last = int(record["slides"]), {K.CROSS: 1, K.TRIPLE: 2}.get(int(record["base_end"]))
-    return {
-        "base_end": record["base_end_point"] * length,
-        "platform_end": record["platform_end_point"] * length,
-        "base_end_axes": record["base_end_axes"],
-        "side": record["side"],
-        "rows": np.concatenate([record["slide_rows"][:slides], record["fixed_rows"][: 3 - slides]]),
-        "kept": record["kept"],
-        "moved": record["moved"],
-        "square": np.zeros(3) if last is None else square_to(record["base_end_axes"][last])[0],
-    }
