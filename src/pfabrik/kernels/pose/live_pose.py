@@ -27,7 +27,6 @@ from ..drives import (
     kept_of_rate,
     left_of_limit,
     put_bounds,
-    rest_at,
     share_to_rest,
     slowed,
     ticks_left,
@@ -319,7 +318,7 @@ def search_in_time(own: LivePose, scratch: LiveScratch, aim: int) -> bool:
 
 @routine
 def put_outputs(own: LivePose, scratch: LiveScratch, dt: float) -> None:
-    """Fill pose and actuators from the state, where drives have gone in dt seconds; or rest, where these are none."""
+    """Fill pose and actuators from the state, where drives have gone in dt seconds; or are, where these are none."""
     search, table, drives, exceeded = scratch.search, own.search, own.drives, 0.0
     evaluate_legs(table, own.state, search.leg_eval)
     first = table.limited.shape[0] - drives.shape[0]
@@ -329,7 +328,7 @@ def put_outputs(own: LivePose, scratch: LiveScratch, dt: float) -> None:
         if dt > 0.0:
             exceeded = max(exceeded, go_to(drives[i], value, dt))
         else:
-            rest_at(drives[i], value)
+            drives[i]["value"] = value
         own.actuators[driven["column"]] = driven["home"] + value * driven["unit"]
     own.tick[0]["exceeded"] = exceeded
     put_pose(own.state.pose, table.task[0]["length"], own.begin)
@@ -428,9 +427,7 @@ def tick_pose(live: int, scratch_address: int, dt: float) -> int:
 
 @search
 def place_pose(live: int, scratch_address: int) -> None:
-    """Fill pose, actuators and the values of drives of a machine that rests at `LivePose.state`."""
+    """Fill pose, actuators and the values of drives of a machine at `LivePose.state`."""
     own, scratch = open_live(live), open_scratch(scratch_address)
-    for j in range(own.step.shape[0]):
-        own.step[j] = 0.0
     place_proximal(own.search, own.state, 0.0, scratch.search.leg_eval)
     put_outputs(own, scratch, 0.0)
