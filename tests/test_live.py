@@ -164,6 +164,19 @@ def test_a_machine_goes_to_where_its_drives_are_measured_and_starts_where_it_is_
         live.reset(start)
 
 
+@pytest.mark.parametrize("name", ["panda", "closure.arm", "delta"])
+def test_with_accelerations_too_a_machine_comes_to_rest_at_a_target_that_rests(name: str) -> None:
+    if INTERPRETED:
+        pytest.skip("hundreds of ticks")
+    mechanism = machine(name)
+    most = SPAN / 50 * actuator_units(mechanism)
+    accelerations = dict(zip(mechanism.actuator_names, 0.05 * most, strict=True))
+    live, target = live_of(mechanism, 50, acceleration=accelerations), smooth(mechanism, 25)[17]
+    for _ in range(350):
+        live.tick(target, 1.0)
+    assert np.abs(live.speeds / most).max() < 1e-4
+
+
 @pytest.mark.parametrize("acceleration", [None, 0.1])
 def test_a_reset_forgets_all_ticks(acceleration: float | None) -> None:
     hexapod = machine("stewart")

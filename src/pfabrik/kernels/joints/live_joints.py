@@ -282,6 +282,7 @@ def go_on(own: LiveJoints, scratch: DescentScratch, dt: float) -> None:
     """One tick of dt seconds towards the target, or to rest where that is no pose."""
     tick, is_target = own.tick[0], is_pose(own.targets[0])
     tick["attempt"], tick["searched"], tick["ticks"] = STILL, 0, ticks_to_rest(own.drives, 1.0, dt)
+    tick["to_target"] = tick["ticks"]  # no closed form says how drives go with a target that moves
     if is_target:
         load_scaled(own)
         come_nearer(own, scratch)
