@@ -78,5 +78,6 @@ def test_in_single_precision_speeds_and_limits_are_kept_and_targets_as_near(name
 def test_parts_that_make_no_sense_are_refused() -> None:
     with pytest.raises(InvalidArgument, match="'live' is made of them"):
         c_source(machine("stewart"), parts=("live",))
-    with pytest.raises(UnsupportedMechanism):
-        c_source(machine("nrpm"), parts=PARTS)
+    for name in ("nrpm", "files.crank_rocker"):
+        with pytest.raises(UnsupportedMechanism):
+            c_source(machine(name), parts=PARTS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -161,6 +162,70 @@ def test_a_machine_goes_to_where_its_drives_are_measured_and_starts_where_it_is_
         np.testing.assert_allclose(other.actuators, live.actuators, atol=1e-9)
         assert other.tick(hexapod.home_pose, 1.0) is live.tick(hexapod.home_pose, 1.0)
         live.reset(start)
+
+
+@pytest.mark.parametrize("name", ["panda", "closure.arm", "delta"])
+def test_with_accelerations_too_a_machine_comes_to_rest_at_a_target_that_rests(name: str) -> None:
+    if INTERPRETED:
+        pytest.skip("hundreds of ticks")
+    mechanism = machine(name)
+    most = SPAN / 50 * actuator_units(mechanism)
+    accelerations = dict(zip(mechanism.actuator_names, 0.05 * most, strict=True))
+    live, target = live_of(mechanism, 50, acceleration=accelerations), smooth(mechanism, 25)[17]
+    for _ in range(350):
+        live.tick(target, 1.0)
+    assert np.abs(live.speeds / most).max() < 1e-4
+
+
+@pytest.mark.parametrize("acceleration", [None, 0.1])
+def test_a_reset_forgets_all_ticks(acceleration: float | None) -> None:
+    hexapod = machine("stewart")
+    live, targets = live_of(hexapod, 50, acceleration=acceleration), smooth(hexapod, 12 if INTERPRETED else 60)
+    once = live.follow(targets, sample_time=1.0).actuators
+    live.reset()
+    assert live.lag == 0.0 and live.holding == ()
+    np.testing.assert_array_equal(live.follow(targets, sample_time=1.0).actuators, once)
+
+
+@pytest.mark.parametrize("share", [None, 0.03])
+def test_a_linkage_stays_on_its_side_of_the_dead_points_of_its_loop(share: float | None) -> None:
+    """A four-bar driven at its rocker: crank and coupler in line are a dead point, which speeds alone do not stop."""
+    if INTERPRETED:
+        pytest.skip("hundreds of ticks")
+    told = machine("files.crank_rocker")
+    driven = {"crank": False, "rocker": True}
+    joints = [replace(joint, actuated=driven.get(joint.name, False)) for joint in told.joints]
+    linkage = replace(told, joints=tuple(joints), task=("y",))
+    for ticks in (5, 30):
+        live = live_of(linkage, ticks, acceleration=None if share is None else share * SPAN / ticks)
+        rng, targets, target, went = np.random.default_rng(1), smooth(linkage, 50), linkage.home_pose, 0.0
+        for k in range(120):
+            target = targets[rng.integers(50)] if k % 25 == 0 else target
+            before = live.actuators.copy()
+            live.tick(target, 1.0)
+            went += np.abs(live.actuators - before).max()
+            at = {name: np.asarray(point)[:2] for name, point in live.solution.points.items()}
+            crank, coupler = at["crank_pin"] - at["crank"], at["rocker_pin"] - at["crank_pin"]
+            assert crank[0] * coupler[1] - crank[1] * coupler[0] < 0.0
+        assert went > 0.5
+
+
+@pytest.mark.parametrize("name", ["stewart", "panda", "closure.H4"])
+def test_ticks_of_no_length_say_nothing_of_how_fast_drives_are(name: str) -> None:
+    mechanism = machine(name)
+    live, targets = live_of(mechanism, 20, acceleration=1e-9), smooth(mechanism, 12)
+    for target in targets:
+        for dt in (5e-324, 1e-15):
+            live.tick(target, dt)
+            assert np.abs(live.speeds).max() == 0.0
+
+
+def test_speeds_are_kept_to_the_last_digit_where_loops_close_no_better_than_their_description() -> None:
+    mechanism = machine("closure.H4")
+    live, target = live_of(mechanism, 100), smooth(mechanism, 40)[3]
+    before = live.actuators.copy()
+    live.tick(target, 1.0)
+    assert (np.abs(live.actuators - before) <= SPAN / 100 * actuator_units(mechanism)).all()
 
 
 def test_what_holds_a_tick_is_named() -> None:

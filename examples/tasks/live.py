@@ -96,4 +96,5 @@ print(f"{live.lag:.1f} mm from the target, at rest; held by {', '.join(live.hold
 #
 # A tick takes as long as a few answers of `Solver.ik`, near or out of reach, and allocates nothing. It looks around
 # itself alone: where a workspace falls into parts, or an arm has folded into a corner, another part may be nearer to
-# the target; `solve_ik` finds it, and only a motion that you plan leads there.
+# the target; `solve_ik` finds it, and only a motion that you plan leads there. Parallel singularities are passed as the
+# target leads, although drives do not hold the platform there: keep streams away from them (`pf.singularity_map`).

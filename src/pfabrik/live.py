@@ -41,11 +41,12 @@ class Live:
     """Drives a mechanism along a stream of targets, tick by tick.
 
     Each tick goes to the nearest pose that the drives get to in time: with all loops closed and every limit kept, no
-    drive faster than it may, links apart, on the same side of every dead point. So nothing leaps, out of reach or where
-    an answer lies in another part of the workspace, and what does not move says what holds it.
+    drive faster than it may, links apart, on the same side of every dead point. So no drive leaps, out of reach or
+    where an answer lies in another part of the workspace, and what does not move says what holds it. Parallel
+    singularities are passed as the target leads, although drives do not hold the platform there: `singularity` tells.
 
-    `pose`, `actuators` and `speeds` are read-only views of the same arrays each time. A tick allocates no arrays. An
-    instance is for one thread: make one for each machine.
+    `pose` and `actuators` are read-only views of the same arrays each time. A tick allocates no arrays, but where a
+    linkage has one drive alone. An instance is for one thread: make one for each machine.
 
     Parameters
     ----------
@@ -175,9 +176,7 @@ class Live:
             raise InvalidArgument("actuators", f"batch shape {solution.shape}", "one at a time")
         status = Status(int(solution._rows.status[0]))
         if status is Status.REACHED:
-            rates = self._driven.drives["rate"].copy()
             self._driven.place(solution._configurations)
-            self._driven.drives["rate"] = rates
         return status
 
     def reset(self, start: Start | None = None) -> None:
@@ -194,6 +193,7 @@ class Live:
         if found.status is not Status.REACHED:
             raise InvalidArgument("start", str(found), "a configuration within all limits")
         self._driven.place(begin)
+        self._driven.rest()
         self.status = Status.REACHED
 
     @property

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..common.arrays import Record, Records
 from ._jit import routine
-from .search_constants import CLOSED
+from .search_constants import NEARLY_CLOSED
 
 DRIVE = np.dtype(
     [
@@ -140,7 +140,7 @@ def put_bounds(drive: Record, attempt: int, ticks: float, dt: float) -> None:
     slowest, fastest = max(-speed, drive["rate"] - change), min(speed, drive["rate"] + change)
     if slowest > fastest:  # faster than it may: as slow as it can be
         slowest = fastest = drive["rate"] - math.copysign(change, drive["rate"])
-    spare = min(2.0 * CLOSED, 0.5 * (fastest - slowest) * dt)
+    spare = min(2.0 * NEARLY_CLOSED, 0.5 * (fastest - slowest) * dt)
     least, most = share * (slowest * dt + spare), share * (fastest * dt - spare)
     slowed_down = drive["rate"] * dt * kept_of_rate(ticks)
     lo, hi = min(room * (drive["lo"] - value), slowed_down), max(room * (drive["hi"] - value), slowed_down)
@@ -162,18 +162,17 @@ def slowed(drive: Record, ticks: float, dt: float) -> float:
 
 @routine
 def go_to(drive: Record, value: float, dt: float) -> float:
-    """Note where a drive has gone in a tick; by what share that exceeds its acceleration, 0 if it is kept."""
+    """Note where a drive has gone in a tick; by what share that exceeds its acceleration, 0 if it is kept.
+
+    Where it goes no farther than loops may be open in so short a tick, it is as fast as before.
+    """
     rate, exceeded = (value - drive["value"]) / dt, 0.0
+    if drive["speed"] * dt <= NEARLY_CLOSED:
+        rate = drive["rate"]
     if drive["acceleration"] < math.inf:
         exceeded = max(abs(rate - drive["rate"]) / (drive["acceleration"] * dt) - 1.0, 0.0)
     drive["rate"], drive["value"] = rate, value
     return exceeded
-
-
-@routine
-def rest_at(drive: Record, value: float) -> None:
-    """Let a drive rest at a value."""
-    drive["rate"], drive["value"] = 0.0, value
 
 
 @routine

@@ -14,7 +14,6 @@ from ...kernels.joints.path_kinematics import load_row, new_state, store_row
 from ...kernels.legs.records import TASK
 from ...machine.description.home_mobility import column_joints
 from ...machine.model import Model
-from ...machine.motion.singularities import are_opposite, assembly_signs, loop_blocks
 from ...options import Options
 from ...tolerances import TOLERANCES
 from .configurations import Configurations
@@ -80,43 +79,20 @@ class DrivenJoints(Driven):
         self._scratch = Handle(new_descent_scratch(loops, *links_on_paths(mechanism)))
         self.target, self.pose, self.actuators = self._live.targets[0], self._live.pose, self._live.actuators
         self.tick, self.drives = self._live.tick[0], drives
-        self._signs = np.zeros(0)
-        self._has_signs = bool(loop_blocks(mechanism))
+        self._memory = self._live.tick, self._live.step, self._scratch.record.hessian.multipliers
+        self._state = *self._live.state, self._live.targets
 
-    def go_on(self, dt: float) -> int:
-        """As of `Driven`; a tick that would pass a dead point of a loop is not taken."""
-        if self._has_signs:
-            return self._go_on_before_dead_points(dt)
+    def _tick(self, dt: float) -> int:
         return K.tick_joints(self._handle.address, self._scratch.address, dt)
-
-    def _go_on_before_dead_points(self, dt: float) -> int:
-        live, mechanism = self._live, self._model.mechanism
-        before = [array.copy() for array in (*live.state, live.drives)]
-        speeds = live.drives["speed"].copy()
-        for _ in range(4):
-            status = K.tick_joints(self._handle.address, self._scratch.address, dt)
-            if not are_opposite(assembly_signs(mechanism, self.coordinates()), self._signs).any():
-                live.drives["speed"] = speeds
-                return status
-            for array, saved in zip((*live.state, live.drives), before, strict=True):
-                array[:] = saved
-            live.drives["speed"] *= 0.2
-        live.drives["speed"] = 0.0
-        status = K.tick_joints(self._handle.address, self._scratch.address, dt)
-        live.drives["speed"] = speeds
-        return status
 
     def speeds(self) -> Floats:
         """As of `Driven`."""
         return np.asarray(self.drives["rate"] * self._live.units)
 
-    def place(self, configurations: Configurations) -> None:
-        """As of `Driven`."""
+    def _put(self, configurations: Configurations) -> None:
         live, coordinates = self._live, configurations.coordinates * self._model.closure.scale
         load_row(live.loops, 0, self._closed(coordinates), live.state)
         K.place_joints(self._handle.address, self._scratch.address)
-        if self._has_signs:
-            self._signs = assembly_signs(self._model.mechanism, configurations.coordinates)[0]
 
     def coordinates(self) -> Floats:
         """As of `Driven`."""

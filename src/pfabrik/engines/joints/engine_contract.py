@@ -6,10 +6,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from typing import Literal, Protocol
 
+import numpy as np
+
 from ...common.arrays import Floats, Record, Records
 from ...kernels.pose.search_records import Starts
 from ...kernels.rows import Rows
 from ...machine.model import Model
+from ...machine.motion.singularities import are_opposite, assembly_signs, loop_blocks
 from ...options import Options
 from .attempts import Attempt
 from .close import Closing
@@ -139,6 +142,10 @@ class Engine(InverseEngine):
         """
 
 
+SHARES = 1.0, 0.2, 0.04, 0.008
+"""Shares of their speeds that drives have in a tick, one after the other until it passes no dead point of a loop."""
+
+
 class Driven(ABC):
     """A machine that a stream of targets drives, where it is, and the limits that hold it.
 
@@ -155,21 +162,55 @@ class Driven(ABC):
     actuators: Floats
     tick: Record
     drives: Records
+    _state: tuple[Floats, ...]  # where it is, and the target
+    _memory: tuple[Floats | Records, ...]  # of ticks, all 0 where there were none
 
     def __init__(self, model: Model) -> None:
         self._model = model
+        self._has_signs, self._signs = bool(loop_blocks(model.mechanism)), np.zeros(0)
+
+    def go_on(self, dt: float) -> int:
+        """One tick of dt seconds; its status. One that would pass a dead point of a loop is not taken."""
+        return self._go_on_before_dead_points(dt) if self._has_signs else self._tick(dt)
+
+    def _go_on_before_dead_points(self, dt: float) -> int:
+        memory, drives, mechanism = (*self._state, *self._memory, self.drives), self.drives, self._model.mechanism
+        before, speeds, rates = [array.copy() for array in memory], drives["speed"].copy(), drives["rate"].copy()
+        for share in SHARES:
+            drives["speed"] = share * speeds
+            status = self._tick(dt)
+            drives["speed"] = speeds
+            if not are_opposite(assembly_signs(mechanism, self.coordinates()), self._signs).any():
+                return status
+            for array, saved in zip(memory, before, strict=True):
+                array[:] = saved
+        drives["rate"] = drives["speed"] = 0.0  # it stops
+        status = self._tick(dt)
+        drives["speed"] = speeds
+        self.tick["exceeded"] = max(float(np.max(np.abs(rates) / (drives["acceleration"] * dt))) - 1.0, 0.0)
+        return status
 
     @abstractmethod
-    def go_on(self, dt: float) -> int:
-        """One tick of dt seconds; its status."""
+    def _tick(self, dt: float) -> int: ...
 
     @abstractmethod
     def speeds(self) -> Floats:
         """How fast the drives went in the last tick (n_a,) [length or rad, per s]."""
 
-    @abstractmethod
     def place(self, configurations: Configurations) -> None:
-        """Let it rest where a configuration, one, has it; the rates of its drives are none."""
+        """Put it where a configuration, one, has it; its drives stay as fast as in the last tick."""
+        self._put(configurations)
+        if self._has_signs:
+            self._signs = assembly_signs(self._model.mechanism, configurations.coordinates)[0]
+
+    @abstractmethod
+    def _put(self, configurations: Configurations) -> None: ...
+
+    def rest(self) -> None:
+        """Let it rest where it is, with no memory of ticks."""
+        self.drives["rate"], self.drives["aim"] = 0.0, np.nan
+        for array in self._memory:
+            array[:] = 0
 
     @abstractmethod
     def coordinates(self) -> Floats:

@@ -36,9 +36,10 @@ class DrivenLegs(Driven):
         self._address = self._handle.address, self._scratch.address
         self.target, self.pose, self.actuators = self._live.targets[0], self._live.pose, self._live.actuators
         self.tick, self.drives = self._live.tick[0], self._live.drives
+        self._state = *self._live.state, self._live.begin, self._live.targets
+        self._memory = self._live.tick, self._live.step, self._scratch.record.search.hessian.multipliers
 
-    def go_on(self, dt: float) -> int:
-        """As of `Driven`."""
+    def _tick(self, dt: float) -> int:
         return K.tick_pose(*self._address, dt)
 
     def speeds(self) -> Floats:
@@ -47,8 +48,7 @@ class DrivenLegs(Driven):
         speeds[driven["column"]] = self.drives["rate"] * driven["unit"]
         return speeds
 
-    def place(self, configurations: Configurations) -> None:
-        """As of `Driven`."""
+    def _put(self, configurations: Configurations) -> None:
         live = self._live
         live.state.pose[:] = configurations.rows.poses[0]
         live.state.pose[:3, 3] /= self._model.length

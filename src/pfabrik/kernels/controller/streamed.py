@@ -33,7 +33,11 @@ def begin_stream(own: Streaming, reaching: Reaching, pose: Floats, speeds: Float
     code = rest(reaching, pose)
     if code != 0:
         return code
-    live = own.live
+    live, multipliers = own.live, own.scratch.search.hessian.multipliers
+    for i in range(live.step.shape[0]):
+        live.step[i] = 0.0
+    for i in range(multipliers.shape[0]):
+        multipliers[i] = 0.0
     for i in range(live.drives.shape[0]):
         driven, drive = live.search.driven[i], live.drives[i]
         speed, acceleration = (
@@ -42,10 +46,13 @@ def begin_stream(own: Streaming, reaching: Reaching, pose: Floats, speeds: Float
         )
         if not (speed > 0.0 and speed < math.inf and acceleration >= 0.0):
             return NO_ACTUATORS
+        drive["aim"] = math.nan
         drive["speed"], drive["acceleration"] = speed, acceleration if acceleration > 0.0 else math.inf
     load_pose(pose, live.search.task[0]["length"], live.state.pose)
     copy_row(reaching.scratch.sides, live.state.sides)
     place(live, own.scratch)
+    for i in range(live.drives.shape[0]):
+        live.drives[i]["rate"] = 0.0
     return 0
 
 

@@ -22,7 +22,6 @@ from ..drives import (
     kept_of_rate,
     left_of_limit,
     put_bounds,
-    rest_at,
     share_to_rest,
     slowed,
     ticks_to_rest,
@@ -251,7 +250,7 @@ def search_in_time(own: LiveJoints, scratch: DescentScratch, aims: bool) -> bool
 
 @routine
 def put_outputs(own: LiveJoints, scratch: DescentScratch, dt: float) -> None:
-    """Fill pose and actuators from the state, where drives have gone in dt seconds; or rest, where these are none."""
+    """Fill pose and actuators from the state, where drives have gone in dt seconds; or are, where these are none."""
     drives, task, exceeded = own.drives, own.task[0], 0.0
     walk_all(own.loops, own.state, scratch)
     for i in range(drives.shape[0]):
@@ -259,7 +258,7 @@ def put_outputs(own: LiveJoints, scratch: DescentScratch, dt: float) -> None:
         if dt > 0.0:
             exceeded = max(exceeded, go_to(drives[i], value, dt))
         else:
-            rest_at(drives[i], value)
+            drives[i]["value"] = value
         own.actuators[i] = own.homes[i] + value * own.units[i]
     own.tick[0]["exceeded"] = exceeded
     for i in range(3):
@@ -283,6 +282,7 @@ def go_on(own: LiveJoints, scratch: DescentScratch, dt: float) -> None:
     """One tick of dt seconds towards the target, or to rest where that is no pose."""
     tick, is_target = own.tick[0], is_pose(own.targets[0])
     tick["attempt"], tick["searched"], tick["ticks"] = STILL, 0, ticks_to_rest(own.drives, 1.0, dt)
+    tick["to_target"] = tick["ticks"]  # no closed form says how drives go with a target that moves
     if is_target:
         load_scaled(own)
         come_nearer(own, scratch)
@@ -321,8 +321,6 @@ def tick_joints(live: int, scratch_address: int, dt: float) -> int:
 
 @search
 def place_joints(live: int, scratch_address: int) -> None:
-    """Fill pose, actuators and the values of drives of a machine that rests at `LiveJoints.state`."""
+    """Fill pose, actuators and the values of drives of a machine at `LiveJoints.state`."""
     own, scratch = open_live(live), open_scratch(scratch_address)
-    for j in range(own.step.shape[0]):
-        own.step[j] = 0.0
     put_outputs(own, scratch, 0.0)

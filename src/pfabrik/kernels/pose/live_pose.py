@@ -27,7 +27,6 @@ from ..drives import (
     kept_of_rate,
     left_of_limit,
     put_bounds,
-    rest_at,
     share_to_rest,
     slowed,
     ticks_left,
@@ -324,7 +323,7 @@ def search_in_time(own: LivePose, scratch: LiveScratch, aim: int) -> bool:
 
 @routine
 def put_outputs(own: LivePose, scratch: LiveScratch, dt: float) -> None:
-    """Fill pose and actuators from the state, where drives have gone in dt seconds; or rest, where these are none."""
+    """Fill pose and actuators from the state, where drives have gone in dt seconds; or are, where these are none."""
     search, table, drives, exceeded = scratch.search, own.search, own.drives, 0.0
     evaluate_legs(table, own.state, search.leg_eval)
     first = table.limited.shape[0] - drives.shape[0]
@@ -334,7 +333,7 @@ def put_outputs(own: LivePose, scratch: LiveScratch, dt: float) -> None:
         if dt > 0.0:
             exceeded = max(exceeded, go_to(drives[i], value, dt))
         else:
-            rest_at(drives[i], value)
+            drives[i]["value"] = value
         own.actuators[driven["column"]] = driven["home"] + value * driven["unit"]
     own.tick[0]["exceeded"] = exceeded
     put_pose(own.state.pose, table.task[0]["length"], own.begin)
@@ -433,14 +432,12 @@ def tick_pose(live: int, scratch_address: int, dt: float) -> int:
 
 @routine
 def place(own: LivePose, scratch: LiveScratch) -> None:
-    """Fill pose, actuators and the values of drives of a machine that rests at its state, as far as pose and sides."""
+    """Fill pose, actuators and the values of drives of a machine at its state, as far as pose and sides go."""
     drives, limited = own.drives, own.search.limited
     for i in range(drives.shape[0]):
         place_of_drive = limited.shape[0] - drives.shape[0] + i
         limited[place_of_drive]["lo"] = own.search.driven[i]["lo"]
         limited[place_of_drive]["hi"] = own.search.driven[i]["hi"]
-    for j in range(own.step.shape[0]):
-        own.step[j] = 0.0
     place_proximal(own.search, own.state, 0.0, scratch.search.leg_eval)
     put_outputs(own, scratch, 0.0)
 
