@@ -352,7 +352,9 @@ def test_a_program_in_cpp_calls_the_file_compiled_as_c_which_needs_mathematics_a
 
 # --- parts -----------------------------------------------------------------------------------------------------------
 
-FUNCTIONS = dict(zip(PARTS, ("ik", "limits", "fk", "jacobian", "nearest", "bodies", "effort"), strict=True))
+FUNCTIONS = dict(
+    zip(PARTS, ("ik", "limits", "fk", "jacobian", "nearest", "live_tick", "bodies", "effort"), strict=True)
+)
 CHOICES: list[Any] = [("prs", ("ik",)), ("delta with a shaft", ("limits", "fk")), ("stewart", ("bodies",))]
 CHOICES += [
     pytest.param(name, parts, marks=pytest.mark.campaign)
