@@ -84,6 +84,27 @@ def out_of_reach(name: str, what: str, rng: np.random.Generator, runs: int) -> I
     yield Row(f"{what}, one solve_ik, out of reach", len(far), one / len(far), "a pose of a batch", batch / len(far))
 
 
+def streams(name: str, what: str, runs: int) -> Iterator[Row]:
+    """Ticks along a stream that leaves reach by far and comes back, next to as many answers of `Solver.ik` at home."""
+    mechanism, turn = pf.load(name), np.arange(CALLS) / CALLS * 2.0 * np.pi
+    shift = 0.9 * np.stack([np.sin(turn), np.sin(2 * turn + 0.4), np.sin(3 * turn + 1.0)], axis=1)
+    turned = 0.7 * np.stack([np.sin(2 * turn), np.sin(turn + 0.7), np.sin(3 * turn)], axis=1)
+    targets = pf.pose(mechanism.home_pose[:3, 3] + shift * mechanism.characteristic_length, rotvec=turned)
+    solver, home = pf.Solver(mechanism), mechanism.home_pose.copy()
+    speed = np.ptp(np.asarray(pf.track(mechanism, targets).actuators), axis=0).max() / 50.0
+    live = pf.Live(mechanism, speed=float(speed))
+
+    def along(*targets: Array) -> None:
+        for target in targets:
+            live.tick(target, 1.0)
+
+    ticks, rests, answers = best_times(
+        runs, partial(along, *targets), partial(along, *([home] * CALLS)), each(solver.ik, *([home] * CALLS))
+    )
+    yield Row(f"{what}, Live.tick, out of reach and back", CALLS, ticks / CALLS, "Solver.ik at home", answers / CALLS)
+    yield Row(f"{what}, Live.tick, on a target that rests", CALLS, rests / CALLS, "Solver.ik at home", answers / CALLS)
+
+
 def singular_vectors(mechanism: pf.Mechanism, q: Array) -> None:
     """Those of the loops' conditions, and of what the motions do that these allow."""
     closure, twist = conditions_and_twist(mechanism, q)
@@ -145,6 +166,8 @@ def calls(rng: np.random.Generator, runs: int) -> Iterator[Row]:
     for name, what in (("stewart", "6-UPS"), ("delta", "delta"), ("rps", "3-RPS"), ("serial_arm", "serial arm")):
         yield from questions(name, what, rng, runs)
         yield from out_of_reach(name, what, rng, min(runs, 5))
+    for name, what in (("stewart", "6-UPS"), ("delta", "delta"), ("g1_ankle", "humanoid ankle"), ("panda", "Panda")):
+        yield from streams(name, what, runs)
     yield from first_order(rng, runs)
     for name, what in (("stewart", "6-UPS"), ("servo_hexapod", "6-RUS"), ("delta", "delta"), ("nrpm", "NRPM")):
         yield from other_geometries(name, what, rng, runs)

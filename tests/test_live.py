@@ -228,6 +228,16 @@ def test_speeds_are_kept_to_the_last_digit_where_loops_close_no_better_than_thei
     assert (np.abs(live.actuators - before) <= SPAN / 100 * actuator_units(mechanism)).all()
 
 
+def test_passive_joints_turn_on_where_they_pass_half_a_turn() -> None:
+    linkage = machine("files.crank_rocker")
+    live, targets = live_of(linkage, 60), smooth(linkage, 12 if INTERPRETED else 120)
+    q = [live.q]
+    for target in targets:
+        live.tick(target, 1.0)
+        q.append(live.q)
+    assert np.abs(np.diff(q, axis=0)).max() < 1.0
+
+
 def test_what_holds_a_tick_is_named() -> None:
     hexapod = machine("stewart")
     live, up = live_of(hexapod, 100), hexapod.home_pose.copy()

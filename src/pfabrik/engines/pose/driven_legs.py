@@ -32,6 +32,7 @@ class DrivenLegs(Driven):
     def __init__(self, model: Model, options: Options, speeds: Floats, accelerations: Floats) -> None:
         super().__init__(model)
         self._live = live_tables(model, options, speeds, accelerations)
+        self._told: Floats | None = None  # coordinates that were asked for last: whole turns are counted from there
         self._handle, self._scratch = Handle(self._live), Handle(K.new_live_scratch(self._live))
         self._address = self._handle.address, self._scratch.address
         self.target, self.pose, self.actuators = self._live.targets[0], self._live.pose, self._live.actuators
@@ -53,7 +54,7 @@ class DrivenLegs(Driven):
         live.state.pose[:] = configurations.rows.poses[0]
         live.state.pose[:3, 3] /= self._model.length
         live.state.sides[:] = sides_at(self._model, configurations)[0]
-        live.state.q[:] = 0.0
+        live.state.q[:], self._told = 0.0, configurations.coordinates.copy()
         K.place_pose(*self._address)
 
     def coordinates(self) -> Floats:
@@ -61,7 +62,9 @@ class DrivenLegs(Driven):
         rows, live = new_rows(self._model, 1), self._live
         rows.status[:], rows.poses[0], rows.actuators[0] = PROJECTED, live.pose, live.actuators
         sides, q = live.state.sides[None].copy(), live.state.q[None].copy()
-        return leg_answers(self._model, rows, sides, q, None, sides).coordinates
+        before = None if self._told is None else Configurations(rows, self._told)
+        self._told = leg_answers(self._model, rows, sides, q, before, sides).coordinates
+        return self._told.copy()
 
     def multipliers(self) -> dict[tuple[str, str], float]:
         """As of `Driven`."""
