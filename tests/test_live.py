@@ -141,7 +141,23 @@ def test_second_differences_of_drives_keep_accelerations_but_for_what_is_told(na
         told.append(live.exceeded)
     excess = np.abs(np.diff(rates, axis=0) / units).max(axis=1) / most - 1.0
     np.testing.assert_allclose(np.maximum(excess, 0.0), told, atol=1e-6)
-    assert np.mean(np.array(told) > 1e-6) <= 0.1  # limits bend away faster than drives may brake
+    assert np.mean(np.array(told) > 1e-6) <= 0.05
+    assert np.mean(np.array(told) > 0.5) <= 0.03  # limits bend away faster than drives may brake
+
+
+@pytest.mark.parametrize("name", ["g1_ankle", "canfield", "ankle_ups", "rps", "stewart", "panda", "files.spare_arm"])
+def test_drives_that_take_time_to_brake_rest_where_others_do(name: str) -> None:
+    if INTERPRETED:
+        pytest.skip("hundreds of ticks")
+    mechanism, target = machine(name), smooth(machine(name), 25)[3]
+    units = actuator_units(mechanism)
+    limits = dict(zip(mechanism.actuator_names, SPAN / 800 * units, strict=True))
+    slow, free = live_of(mechanism, 40, acceleration=limits), live_of(mechanism, 40)
+    for _ in range(390):
+        slow.tick(target, 1.0)
+        free.tick(target, 1.0)
+    assert np.abs(slow.speeds / units).max() < 1e-6
+    assert slow.lag <= free.lag + 1e-6 * mechanism.characteristic_length
 
 
 def test_a_machine_goes_to_where_its_drives_are_measured_and_starts_where_it_is_told() -> None:

@@ -30,6 +30,7 @@ TICK = np.dtype(
     [
         ("status", "i8"),  # of the last tick: REACHED, PROJECTED, or INVALID where the target is no pose
         ("attempt", "i8"),  # that found something; STILL if none did
+        ("looks", "i8"),  # 1: it aimed at where drives may rest, not at the target itself
         ("searched", "i8"),  # 1: limits have multipliers
         ("ticks", "f8"),  # as of `ticks_to_rest`, at its begin
         ("to_target", "f8"),  # the same, beside a target that moves as in the tick before

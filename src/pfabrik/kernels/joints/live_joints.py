@@ -233,16 +233,39 @@ def has_moved(own: LiveJoints, state: State) -> bool:
 
 
 @routine
-def search_in_time(own: LiveJoints, scratch: DescentScratch, aims: bool) -> bool:
-    """Go to the nearest configuration that loops, limits and links leave, and drives get to in this tick, from here."""
-    objective = objective_of(own, aims, QUADRATIC_PROGRAMMES)
-    put_margins(own, scratch, objective)
+def search_from_here(own: LiveJoints, scratch: DescentScratch, aims: bool) -> bool:
+    """Descend from where the machine is; where limits bend away from the first steps, shorter ones follow."""
     scratch.control[0]["is_warm"], multipliers = 1, scratch.hessian.multipliers
     for i in range(own.columns.shape[0]):
         multipliers[2 * own.columns[i]] = multipliers[2 * own.columns[i] + 1] = 0.0
-    is_found = descend_from_here(own, scratch, objective)
+    is_found = descend_from_here(own, scratch, objective_of(own, aims, QUADRATIC_PROGRAMMES))
     if is_found and scratch.control[0]["is_rejected"] == 1 and not has_moved(own, scratch.best):
         is_found = descend_from_here(own, scratch, objective_of(own, aims, MORE))
+    return is_found
+
+
+@routine
+def look_ahead(own: LiveJoints, scratch: DescentScratch, dt: float) -> None:
+    """As of `pose.live_pose`, for any target."""
+    drives, lo, hi, scaled, X = own.drives, own.loops.lo, own.loops.hi, own.scaled[0], scratch.best.X
+    ticks = 1.0 / share_to_rest(own.tick[0]["ticks"])
+    for i in range(drives.shape[0]):
+        value, way, j = drives[i]["value"], ticks * drives[i]["speed"] * dt, own.columns[i]
+        lo[j], hi[j] = max(drives[i]["lo"], value - way), min(drives[i]["hi"], value + way)
+    for c in range(scratch.margins.shape[0]):
+        scratch.margins[c] = 0.0
+    if search_from_here(own, scratch, True):
+        walk_all(own.loops, scratch.best, scratch)
+        for i in range(3):
+            for j in range(4):
+                scaled[i, j] = X[i, j]
+
+
+@routine
+def search_in_time(own: LiveJoints, scratch: DescentScratch, aims: bool) -> bool:
+    """Go to the nearest configuration that loops, limits and links leave, and drives get to in this tick, from here."""
+    put_margins(own, scratch, objective_of(own, aims, QUADRATIC_PROGRAMMES))
+    is_found = search_from_here(own, scratch, aims)
     if is_found:
         go_to_state(own, scratch.best)
     return is_found
@@ -285,7 +308,9 @@ def go_on(own: LiveJoints, scratch: DescentScratch, dt: float) -> None:
     tick["to_target"] = tick["ticks"]  # no closed form says how drives go with a target that moves
     if is_target:
         load_scaled(own)
-        come_nearer(own, scratch)
+        if tick["ticks"] > 0.0:
+            look_ahead(own, scratch, dt)
+            come_nearer(own, scratch)
     else:
         for i in range(own.drives.shape[0]):
             own.anchors[0, own.columns[i]] = slowed(own.drives[i], tick["ticks"], dt)

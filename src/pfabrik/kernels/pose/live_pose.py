@@ -97,6 +97,8 @@ class LiveScratch(NamedTuple):
     measures: Floats  # (5,)
     trial: Floats  # (n_a,): actuators
     sides: Floats  # (legs,)
+    ahead: Floats  # (4, 4): where `look_ahead` leads [L]
+    start: PlatformState  # where a search begins
     before: PlatformState  # where a tick began
     aside: PlatformState  # where it might end
     end: PlatformState  # where the nearest of its searches ends
@@ -112,6 +114,8 @@ def new_live_scratch(live: LivePose) -> LiveScratch:
         np.zeros(5),
         np.zeros(n),
         np.zeros(legs),
+        np.zeros((4, 4)),
+        new_platform_state(legs),
         new_platform_state(legs),
         new_platform_state(legs),
         new_platform_state(legs),
@@ -249,20 +253,71 @@ def put_margins(own: LivePose, scratch: LiveScratch, objective: PlatformObjectiv
 
 
 @routine
-def come_nearer(own: LivePose, search: SearchScratch) -> None:
+def look_ahead(own: LivePose, scratch: LiveScratch, dt: float) -> None:
+    """Move the target of this tick, where legs do not reach it, to the nearest pose from which drives could still rest.
+
+    That is where they come to at full speed in as many ticks as they take to rest; `come_nearer` slows down for it.
+    """
+    search, table, drives, limited = scratch.search, own.search, own.drives, own.search.limited
+    first, ticks = limited.shape[0] - drives.shape[0], 1.0 / share_to_rest(own.tick[0]["ticks"])
+    for i in range(drives.shape[0]):
+        value, way = drives[i]["value"], ticks * drives[i]["speed"] * dt
+        limited[first + i]["lo"], limited[first + i]["hi"] = value - way, value + way
+    for c in range(search.margins.shape[0]):
+        search.margins[c] = 0.0
+    begin_search(own, scratch, AIM)
+    is_target = load_target(table, pose_objective(own.plan, AIM, own.targets, MORE), 0, search)
+    if is_target and descend_from_here(own, scratch, AIM, own.state) < math.inf:
+        copy_table(search.best.pose, scratch.ahead)
+        own.tick[0]["looks"] = 1
+
+
+@routine
+def descend_from_here(own: LivePose, scratch: LiveScratch, aim: int, begin: PlatformState) -> float:
+    """Descend from a configuration to `search.best`; its distance [L], infinite without one.
+
+    Where limits bend away from the first steps, so that none is taken, shorter ones follow.
+    """
+    search, plan, table = scratch.search, own.plan, own.search
+    implied, values = plan.settings[aim]["implied"], own.values if aim == VALUES else scratch.no_values
+    pose = pose_objective(plan, aim, own.targets, QUADRATIC_PROGRAMMES)
+    copy_platform_state(begin, search.best)
+    found = descend(table, 0, PlatformObjective(pose, values, implied), math.inf, own.state, search)
+    if search.control[0]["is_rejected"] == 1 and is_same(own.state, search.best):
+        more = pose_objective(plan, aim, own.targets, MORE)
+        copy_platform_state(own.state, search.best)
+        found = descend(table, 0, PlatformObjective(more, values, implied), math.inf, own.state, search)
+    return found
+
+
+@routine
+def come_nearer(own: LivePose, scratch: LiveScratch) -> None:
     """Move the target of this tick to where drives that come to rest on it are after the tick."""
-    share, target, pose, turn = (
-        share_to_rest(own.tick[0]["to_target"]),
-        search.target,
-        own.state.pose,
-        search.gradient.turn,
-    )
+    share, target, pose = share_to_rest(own.tick[0]["to_target"]), scratch.search.target, own.state.pose
+    turn = scratch.search.gradient.turn
+    if own.tick[0]["looks"] == 1:
+        copy_table(scratch.ahead, target)
     difference(target, pose, turn)
     for i in range(3):
         target[i, 3] = pose[i, 3] + share * (target[i, 3] - pose[i, 3])
         for j in range(3):
             target[i, j] = pose[i, j]
     turn_pose(target, scale(share, vec(turn)))
+
+
+@routine
+def begin_search(own: LivePose, scratch: LiveScratch, aim: int) -> None:
+    """Prepare a search: all cones and links count, dead points are kept, and multipliers but those of drives."""
+    search, table, kept_sides = scratch.search, own.search, scratch.search.kept_sides
+    search.n_cones[0] = table.cones.shape[0]
+    search.links.kept[0] = search.links.pairs.shape[0]
+    for k in range(kept_sides.shape[0]):
+        kept_sides[k] = own.state.sides[k] if has_proximal(table.legs[k]) else 0.0
+    fix_held(pose_objective(own.plan, aim, own.targets, QUADRATIC_PROGRAMMES), True, search)
+    begin_effort(UNBOUNDED, UNBOUNDED, search.effort[0])
+    search.control[0]["is_warm"], end = 1, 2 * table.limited.shape[0]
+    for number in range(end - 2 * own.drives.shape[0], end):
+        search.hessian.multipliers[number] = 0.0
 
 
 @routine
@@ -278,38 +333,24 @@ def is_same(one: PlatformState, other: PlatformState) -> bool:
 @routine
 def search_in_time(own: LivePose, scratch: LiveScratch, aim: int) -> bool:
     """Go to the nearest pose that limits, links and dead points leave, and drives get to in this tick, from here."""
-    search, table, plan = scratch.search, own.search, own.plan
-    setting, kept_sides = plan.settings[aim], search.kept_sides
+    search, table, plan, trial = scratch.search, own.search, own.plan, scratch.start
     pose = pose_objective(plan, aim, own.targets, QUADRATIC_PROGRAMMES)
-    more = pose_objective(plan, aim, own.targets, MORE)
-    values = own.values if aim == VALUES else scratch.no_values
-    objective = PlatformObjective(pose, values, setting["implied"])
+    values, ticks = own.values if aim == VALUES else scratch.no_values, own.tick[0]["ticks"]
     if not load_target(table, pose, 0, search):
         return False
-    search.n_cones[0] = table.cones.shape[0]
-    search.links.kept[0] = search.links.pairs.shape[0]
-    for k in range(kept_sides.shape[0]):
-        kept_sides[k] = own.state.sides[k] if has_proximal(table.legs[k]) else 0.0
-    fix_held(pose, True, search)
-    begin_effort(UNBOUNDED, UNBOUNDED, search.effort[0])
-    search.control[0]["is_warm"], end = 1, 2 * table.limited.shape[0]
-    for number in range(end - 2 * own.drives.shape[0], end):
-        search.hessian.multipliers[number] = 0.0
+    begin_search(own, scratch, aim)
     if aim == AIM:
-        come_nearer(own, search)
-    put_margins(own, scratch, objective)
+        come_nearer(own, scratch)
+    put_margins(own, scratch, PlatformObjective(pose, values, plan.settings[aim]["implied"]))
     distance = math.inf
     for bends in range(2):
-        copy_platform_state(own.state, search.best)
-        if own.tick[0]["ticks"] > 0.0:  # where drives slow down together, which they can
-            move(table, own.step, kept_of_rate(own.tick[0]["ticks"]), search.best)
-            close_rods(table, search.best, search.leg_eval)
-        if bends == 1 and not bend(own, search.best, search.leg_eval):
+        copy_platform_state(own.state, trial)
+        if ticks > 0.0:  # where drives slow down together, which they can
+            move(table, own.step, kept_of_rate(ticks), trial)
+            close_rods(table, trial, search.leg_eval)
+        if bends == 1 and not bend(own, trial, search.leg_eval):
             break
-        found = descend(table, 0, objective, math.inf, own.state, search)
-        if search.control[0]["is_rejected"] == 1 and is_same(own.state, search.best):
-            copy_platform_state(own.state, search.best)
-            found = descend(table, 0, PlatformObjective(more, values, setting["implied"]), math.inf, own.state, search)
+        found = descend_from_here(own, scratch, aim, trial)
         if found < (1.0 - SAME_DISTANCE) * distance:
             put_sides(table, search.best, search.leg_eval)
             if not is_other_mode(table.legs, own.state.sides, search.best.sides):
@@ -397,6 +438,9 @@ def go_on(own: LivePose, scratch: LiveScratch, dt: float) -> None:
             drives[i]["aim"] = math.nan
             own.values[0, own.search.driven[i]["column"]] = slowed(drives[i], tick["ticks"], dt)
     copy_platform_state(own.state, scratch.before)
+    tick["looks"] = 0
+    if is_target and not is_known and tick["ticks"] > 0.0:
+        look_ahead(own, scratch, dt)
     for attempt in range(ATTEMPTS):
         factor, _ = attempt_of(attempt)
         tick["ticks"] = ticks_to_rest(drives, factor, dt)
