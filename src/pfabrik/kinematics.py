@@ -24,7 +24,7 @@ from .engines.joints.first_order import JointRates
 from .engines.targets import Target, as_targets, carrying_joint
 from .engines.varied import LegSlopes, MachineAt, VariedGeometry, VariedMachine, leg_slopes, varied
 from .machine.description.body_inertias import BodyInertia, inertias_of
-from .machine.description.drive_limits import drive_limits
+from .machine.description.drive_bounds import drive_limits
 from .machine.description.graph import tree_of
 from .machine.description.home_mobility import column_joints
 from .machine.description.links import links_of

@@ -27,7 +27,7 @@ from .engines.targets import Target, as_targets
 from .errors import InvalidArgument
 from .fk import Actuators, solve_fk
 from .kernels.rows import ROTATION_ERROR
-from .machine.description.drive_limits import drive_limits
+from .machine.description.drive_bounds import drive_limits
 from .machine.description.mechanism import Mechanism, checked_mechanism
 from .machine.description.task import task_of
 from .machine.model import model_of

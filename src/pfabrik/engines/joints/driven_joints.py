@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from ...common.arrays import Floats, Record
-from ...kernels.drives import DRIVE, TICK
 from ...kernels.handle import Handle
 from ...kernels.joints import live_joints as K
 from ...kernels.joints.linearise_loops import new_descent_scratch
 from ...kernels.joints.loops import Closed, Objective, PoseObjective
 from ...kernels.joints.path_kinematics import load_row, new_state, store_row
 from ...kernels.legs.records import TASK
+from ...kernels.ticks import DRIVE, TICK
 from ...machine.description.home_mobility import column_joints
 from ...machine.model import Model
 from ...options import Options

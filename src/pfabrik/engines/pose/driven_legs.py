@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from ...common.arrays import Floats
-from ...kernels.drives import DRIVE, TICK
 from ...kernels.handle import Handle
 from ...kernels.pose import live_pose as K
 from ...kernels.pose.equations import count_unknowns, new_platform_state
 from ...kernels.pose.search_records import Starts, new_solutions
 from ...kernels.rows import PROJECTED
 from ...kernels.search_constants import MOST_STEPS
+from ...kernels.ticks import DRIVE, TICK
 from ...machine.model import Model
 from ...options import Options
 from ...tolerances import TOLERANCES

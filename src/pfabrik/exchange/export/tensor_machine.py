@@ -57,7 +57,7 @@ class Dimension(NamedTuple):
     of: list[str]
 
 
-class Placed(NamedTuple):
+class NotedLegs(NamedTuple):
     """Legs in closed form at a pose; a list for each number, by twists of the platform in L and rad.
 
     Attributes
@@ -76,7 +76,7 @@ class Placed(NamedTuple):
     gaps: list[Any]
 
 
-class Equations(NamedTuple):
+class NotedEquations(NamedTuple):
     """Equations [L or rad], and their slopes by the six of a twist, then by each proximal joint that is solved for."""
 
     rows: list[Any]
@@ -327,7 +327,7 @@ class TensorMachine:
         return SimpleNamespace(**self._records, columns=self._table.columns, task=[self._task])
 
     @cached_property
-    def placed(self) -> Placed:
+    def placed(self) -> NotedLegs:
         """Legs at a pose, in closed form and in home's working mode."""
         at, table, legs = self._legs_at_a_pose(), self._noted_table, self._records["legs"]
         of_numbers(answer.place_legs)(legs, at.frames, [leg["side"] for leg in legs], at.values, at.lines)
@@ -348,7 +348,7 @@ class TensorMachine:
         row_rates = [eliminated(at.slopes[row]) for row in range(n_rows)]
         gaps = [*at.rows[:n_rows], *(at.values[k, K.SLIDE] for k in margins if legs[k]["has_proximal"])]
         rooms = [*self._rooms(at), *margins.values()]
-        return Placed(actuators, _turned_over(rates), _turned_over(row_rates), rooms, gaps)
+        return NotedLegs(actuators, _turned_over(rates), _turned_over(row_rates), rooms, gaps)
 
     def _singularity_margins(self, at: SimpleNamespace) -> Iterator[Any]:
         """Of every leg the margin of its proximal joint, or of a pivot's three hinges; None of other legs."""
@@ -390,7 +390,7 @@ class TensorMachine:
             line = tuple(at.values[cone["leg"], place : place + 3])
             yield cone["half_angle"] - of_numbers(vectors.angle_between)(tuple(cone["axis"]), line)
 
-    def _equations(self, q: Sequence[Any], kept: Sequence[int], columns: Sequence[int], more: bool) -> Equations:
+    def _equations(self, q: Sequence[Any], kept: Sequence[int], columns: Sequence[int], more: bool) -> NotedEquations:
         """Equations at proximal coordinates, and their slopes by the twist and by some of these.
 
         Parameters
@@ -417,7 +417,7 @@ class TensorMachine:
             rows.append(of_numbers(vectors.wrap)(gap, 0.0) if driven["turns"] == 1 else gap)
             slopes.append(at.slope.copy())
         chosen = [*range(6), *columns]
-        return Equations(rows, _turned_over([[slope[c] for c in chosen] for slope in slopes]))
+        return NotedEquations(rows, _turned_over([[slope[c] for c in chosen] for slope in slopes]))
 
     @cached_property
     def open_columns(self) -> list[int]:
@@ -426,7 +426,7 @@ class TensorMachine:
         return [column for column in range(6, 6 + len(self.proximal)) if column not in driven]
 
     @cached_property
-    def forward(self) -> Equations:
+    def forward(self) -> NotedEquations:
         """The equations that say where the end effector is at given actuators.
 
         Of joints in series, which keep the other constraints, the lengths of rods on proximal joints are enough.
@@ -440,7 +440,7 @@ class TensorMachine:
         return self._equations([q[6 + k] for k in range(m)], kept, self.open_columns, more=True)
 
     @cached_property
-    def closing(self) -> Equations:
+    def closing(self) -> NotedEquations:
         """The equations of all legs, at coordinates of all proximal joints."""
         m = len(self.proximal)
         return self._equations(self.proximal, range(self._task["rows"] + m), range(6, 6 + m), more=False)

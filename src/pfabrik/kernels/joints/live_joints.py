@@ -12,7 +12,15 @@ import numpy as np
 from ...common.arrays import Floats, Ints, Records
 from .._jit import opener, routine, search
 from ..clearance.link_records import NO_LINKS
-from ..drives import (
+from ..free_motions import along_step
+from ..legs.complete_poses import is_pose, turn_pose
+from ..legs.records import TASK
+from ..projecting import priced_distance
+from ..quaternions import difference
+from ..rows import INVALID, PROJECTED, REACHED
+from ..search_constants import CLOSED, NEARLY_CLOSED, SIGHT
+from ..sqp import is_closed
+from ..ticks import (
     ATTEMPTS,
     DRIVE,
     STILL,
@@ -26,14 +34,6 @@ from ..drives import (
     slowed,
     ticks_to_rest,
 )
-from ..free_motions import along_step
-from ..legs.complete_poses import is_pose, turn_pose
-from ..legs.records import TASK
-from ..projecting import priced_distance
-from ..quaternions import difference
-from ..rows import INVALID, PROJECTED, REACHED
-from ..search_constants import CLOSED, NEARLY_CLOSED, SIGHT
-from ..sqp import is_closed
 from ..vectors import scale, vec
 from .close_on_target import errors
 from .descend import descend, move, restore_feasibility

@@ -15,7 +15,18 @@ import numpy as np
 from ...common.arrays import Floats, Records
 from .._jit import opener, routine, search
 from ..clearance.link_limits import links_excess
-from ..drives import (
+from ..free_motions import along_step
+from ..legs.answer import Completion, answer_on_sides, deviation, new_completion
+from ..legs.complete_poses import is_pose, put_pose, turn_pose
+from ..legs.frames import set_frames
+from ..legs.kinds import place_frame
+from ..legs.records import CRANK, Q_PROXIMAL, SAMPLE, Table
+from ..legs.rods import solve_proximal
+from ..projecting import UNBOUNDED, begin_effort, priced_distance
+from ..quaternions import difference
+from ..rows import INVALID, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
+from ..search_constants import NEARLY_CLOSED, REACH, SAME_DISTANCE
+from ..ticks import (
     ATTEMPTS,
     DRIVE,
     STILL,
@@ -33,17 +44,6 @@ from ..drives import (
     ticks_to_rest,
     ticks_to_target,
 )
-from ..free_motions import along_step
-from ..legs.answer import Completion, answer_on_sides, deviation, new_completion
-from ..legs.complete_poses import is_pose, put_pose, turn_pose
-from ..legs.frames import set_frames
-from ..legs.kinds import place_frame
-from ..legs.records import CRANK, Q_PROXIMAL, SAMPLE, Table
-from ..legs.rods import solve_proximal
-from ..projecting import UNBOUNDED, begin_effort, priced_distance
-from ..quaternions import difference
-from ..rows import INVALID, POSITION_ERROR, PROJECTED, REACHED, ROTATION_ERROR
-from ..search_constants import NEARLY_CLOSED, REACH, SAME_DISTANCE
 from ..vectors import copy_row, copy_table, scale, vec, wrap
 from ..vectors import move as moved_by
 from .descend_pose import descend

@@ -52,7 +52,7 @@ Queue: TypeAlias = "queue.SimpleQueue[str | None]"
 Send: TypeAlias = Callable[[object], None]
 
 
-class File(NamedTuple):
+class SentFile(NamedTuple):
     """What a page is sent: its type, its text, and the name that it is saved by; none for one that is shown."""
 
     kind: str
@@ -84,7 +84,7 @@ class PageServer(socketserver.ThreadingTCPServer):
         self,
         host: str,
         port: int,
-        files: Callable[[str], File | None],
+        files: Callable[[str], SentFile | None],
         answers: Callable[[str, Any, Send], None],
     ) -> None:
         self.token, self.host, self.files, self.answers = secrets.token_urlsafe(16), host, files, answers

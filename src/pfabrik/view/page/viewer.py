@@ -26,7 +26,7 @@ from ..skeleton import checked_shown
 from .export_web import web_page
 from .live_questions import LiveQuestions, answered
 from .page_answers import page_answer
-from .server import File, PageServer
+from .server import PageServer, SentFile
 from .watch import Watch
 
 LOOPBACK, PORT = "127.0.0.1", 8080
@@ -171,9 +171,9 @@ class Viewer:
 
     # What pages ask.
 
-    def _file(self, place: str) -> File | None:
+    def _file(self, place: str) -> SentFile | None:
         if place == SAVED:
-            return File("text/html", self._saved(), f"{_plain(self.mechanism.name)}.html")
+            return SentFile("text/html", self._saved(), f"{_plain(self.mechanism.name)}.html")
         if place not in ("", WITHOUT_LIMITS):
             return None
         is_free = place == WITHOUT_LIMITS
@@ -182,7 +182,7 @@ class Viewer:
             _, first, track = self._shown
             if first is not None and first.mechanism != self._machine(is_free):
                 first = None
-            return File(
+            return SentFile(
                 "text/html", web_page(self._machine(is_free), first=first, track=None if is_free else track, live=live)
             )
 
