@@ -55,7 +55,7 @@ print(f"highest speed {np.abs(driven.speeds).max():.1f} mm/s; accelerations kept
 every = pf.configuration(machine, driven.q)
 print((every.status == pf.Status.REACHED).sum(), "of", n, "closed and within limits")
 
-figure, (above, below) = plt.subplots(2, 1, sharex=True, layout="constrained", figsize=(7.0, 4.5))
+figure, (above, below) = plt.subplots(2, 1, sharex=True, layout="constrained", figsize=(6.0, 3.6))
 time = dt * np.arange(n)
 above.plot(time, alone.actuators[:, 0], lw=1, label="each target alone")
 above.plot(time, driven.actuators[:, 0], lw=2, label="live")
@@ -64,7 +64,7 @@ above.legend()
 below.plot(time, np.abs(alone.speeds).max(axis=1), lw=1)
 below.plot(time, np.abs(driven.speeds).max(axis=1), lw=2)
 below.set(xlabel="time [s]", ylabel="fastest strut [mm/s]", yscale="log", ylim=(1.0, None))
-figure.savefig("live.png", dpi=120)
+figure.savefig("live.png", dpi=90)
 
 # ## What a stream may do
 #

@@ -97,6 +97,7 @@ class Live {
     limits.hidden = !this.free && (!machine.hasLimits || !!machine.track);
     limits.setAttribute("aria-pressed", !this.free);
     limits.onclick = () => (location.href = this.place(!this.free) + location.hash);
+    $("#save").href = "saved";
     $("#save").hidden = $("#search").hidden = false;
     for (const name of ["show", "modes"]) this.page.panel.hide(name, false);
     for (const kind of ["working", "assembly"]) $(`#${kind}`).onclick = () => this.findModes(kind);
