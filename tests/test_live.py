@@ -244,6 +244,18 @@ def test_speeds_are_kept_to_the_last_digit_where_loops_close_no_better_than_thei
     assert (np.abs(live.actuators - before) <= SPAN / 100 * actuator_units(mechanism)).all()
 
 
+@pytest.mark.parametrize("name", ["stewart", "servo_hexapod", "rps", "panda"])
+def test_ticks_of_half_the_time_move_every_joint_half_as_far(name: str) -> None:
+    mechanism, ticks, most = machine(name), 12 if INTERPRETED else 100, []
+    for parts in (1, 2):
+        live, q = live_of(mechanism, 40), []
+        for target in smooth(mechanism, parts * ticks):
+            live.tick(target, 1.0 / parts)
+            q.append(live.q)
+        most.append(np.abs(np.diff(q, axis=0)).max())
+    assert most[1] <= 0.7 * most[0] or INTERPRETED
+
+
 def test_passive_joints_turn_on_where_they_pass_half_a_turn() -> None:
     linkage = machine("files.crank_rocker")
     live, targets = live_of(linkage, 60), smooth(linkage, 12 if INTERPRETED else 120)
