@@ -13,6 +13,7 @@ from ..common.printed import ResultTable, error_text, plain
 from ..common.rotations import to_rotvec, to_rpy
 from ..engines.joints.assemble import is_over_determined
 from ..engines.joints.first_order import is_at_dead_point
+from ..machine.decomposition.leg_table import DEAD_POINTS
 from ..machine.description.joints import KINDS
 from ..machine.description.mechanism_table import bound_text
 from ..machine.description.readouts import Readout, readouts
@@ -69,7 +70,7 @@ def causes(answer: Answer) -> list[str]:
     limits = answer._limits[0]
     if not limits:
         return [f"no limit is active: {why_without_limits(answer)}"]
-    blocks_all = limits[0].bound != "stretched" or why_without_limits(answer) != NO_FREEDOM
+    blocks_all = limits[0].bound not in DEAD_POINTS or why_without_limits(answer) != NO_FREEDOM
     return reasons(answer) if blocks_all else [*reasons(answer), NO_FREEDOM]
 
 
@@ -172,7 +173,7 @@ def in_words(limit: ActiveLimit, mechanism: Mechanism) -> tuple[str, str]:
     if limit.bound == "clearance":
         return "", f"clearance {limit.limit:.6g} {mechanism.length_unit}"
     joint = mechanism.joint(limit.joint)
-    if limit.bound == "stretched":
+    if limit.bound in DEAD_POINTS:
         return "", limit.bound
     noun = "joint" if joint.type != "prismatic" else "strut" if joint.along else "slider"
     angle = math.degrees(limit.limit)
@@ -200,6 +201,9 @@ def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
     """
     if bound == "stretched":
         return f"{STRETCHED} at joint{'s' * (len(joints) > 1)} {', '.join(joints)}"
+    if bound == "level":
+        rod = "the rods at {} are" if len(joints) > 1 else "the rod at {} is"
+        return f"{rod.format(', '.join(joints))} level, and {'reach' if len(joints) > 1 else 'reaches'} no farther"
     if bound.startswith("clearance"):
         return f"{', '.join(joints)} at their {bound}"
     subject = f"{noun}{'s' * (len(joints) > 1)} {', '.join(joints)}"
@@ -216,12 +220,16 @@ def short_names(limits: Iterable[ActiveLimit]) -> str:
 
 
 def limit_name(joint: str, bound: str) -> str:
-    """The limit of a joint, or of two bodies, for a cell of a table: ``B3 max``, ``BC1–BC3 clearance``."""
-    return f"{joint} {bound}".strip()
+    """The limit of a joint, or of two bodies, for a cell of a table: ``B3 max``, ``BC1–BC3 clearance``.
+
+    Every border has this name, whichever verb meets it; ``links stretched`` where no joint tells.
+    """
+    return f"{joint or 'links'} {bound}"
 
 
 BOUND_NOTES = {
-    "reach": "reach: a rod is stretched out or folded, and does not reach farther",
+    "stretched": "stretched: links are in line, or square to a slide, at this joint, and reach no farther",
+    "level": "level: the rod at this joint is square to its slide, and reaches no farther",
     "not closed": "not closed: the hinges and rods of a leg do not come together beyond",
 }
 """Bounds that are no limits of a joint, explained."""
