@@ -145,13 +145,13 @@ def dead_point(model: Model, at: Configurations, motions: Sequence[tuple[Floats,
     read = measured(model)
     legs_at = at if read is model else cast(Configurations, start_at_tip(at))
     for velocity, turn in motions if read.has_legs and not read.why_poses_do_not_suffice else ():
-        size = max(float(np.linalg.norm(velocity)), float(np.linalg.norm(turn)))
+        size = float(np.abs([velocity, turn]).max())
         if size == 0.0:
             continue
         pose, step = np.require(legs_at.rows.poses, requirements=["C", "W"]).copy(), JUST_BEYOND / size
         beyond = pose.copy()
         beyond[0, :3, :3] = from_rotvec(step * turn) @ pose[0, :3, :3]
-        beyond[0, :3, 3] += step * model.length * velocity
+        beyond[0, :3, 3] += model.length * (step * velocity)
         margin, binding = leg_margins(read, beyond, pose, sides_at(read, legs_at))
         joint, bound = read.legs.measured_limits[int(binding[0])] if margin[0] < 0.0 else ("", "")
         if bound in DEAD_POINTS:

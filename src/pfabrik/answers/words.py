@@ -20,7 +20,7 @@ from ..machine.description.readouts import Readout, readouts
 from ..machine.description.sketch import sketch
 from ..machine.description.task import task_of
 from ..machine.model import model_of
-from ..machine.motion.fitting_task import has_dependent_coordinates, motions_at, task_remark, tilt_axis
+from ..machine.motion.fitting_task import has_dependent_coordinates, motions_at, task_remark, tilt_axis, what_follows
 from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
@@ -134,12 +134,16 @@ def what_is_wrong(answer: Answer) -> str:
 
 def distance(answer: Answer) -> str:
     """Those of position error and rotation error that exceed the tolerance, with units."""
-    mechanism = answer.mechanism
+    return error_words(answer.mechanism, float(answer.position_error), float(answer.rotation_error))
+
+
+def error_words(mechanism: Mechanism, position: float, rotation: float) -> str:
+    """Those of two errors [length], [rad] that exceed the tolerance, each with its unit: ``12.3 mm and 4 deg``."""
     parts = []
-    if answer.position_error > TOLERANCES.position * mechanism.characteristic_length:
-        parts.append(f"{float(answer.position_error):.3g} {mechanism.length_unit}")
-    if answer.rotation_error > TOLERANCES.rotation:
-        parts.append(f"{math.degrees(float(answer.rotation_error)):.3g} deg")
+    if position > TOLERANCES.position * mechanism.characteristic_length:
+        parts.append(f"{position:.3g} {mechanism.length_unit}")
+    if rotation > TOLERANCES.rotation:
+        parts.append(f"{math.degrees(rotation):.3g} deg")
     return " and ".join(parts) or "a hair"
 
 
@@ -284,9 +288,9 @@ def _pose(answer: Answer) -> list[str]:
         ("x y z", "   ".join(position), answer.mechanism.length_unit),
         ("roll pitch yaw", "   ".join(angles), "deg"),
     ]
-    width = max(len(text) for _, text, _ in rows)
+    width, left_open = max(len(text) for _, text, _ in rows), what_follows(answer.mechanism)
     lines = [f"{name:<16}{text:<{width}}   [{unit}]" for name, text, unit in rows]
-    return [*lines, f"{'loops closed to':<16}{loop_gap(answer)}"]
+    return [*lines, f"{'loops closed to':<16}{loop_gap(answer)}", *([left_open] if left_open else [])]
 
 
 def pose_texts(answer: Answer) -> tuple[list[str], list[str]]:

@@ -13,7 +13,7 @@ from ..machine.description.graph import leaves, next_joints, steps_from_base
 from ..machine.description.home_mobility import ends_of_default_axes, universal_axes
 from ..machine.description.mechanism import Joint, Mechanism
 from ..machine.description.symmetry import crossed_rounds, near_copies
-from ..machine.motion.fitting_task import has_weak_coordinates, task_remark
+from ..machine.motion.fitting_task import has_weak_coordinates, task_hint, task_remark
 from ..view.overview import NOT_COUNTED, counted_mobility, nearly_free, vector
 
 FULL_TURN = 2.0 * math.pi
@@ -27,6 +27,8 @@ def remarks_on(mechanism: Mechanism) -> Iterator[str]:
     else:
         if has_weak_coordinates(mechanism):
             yield f"{task_remark(mechanism)}; hardly any target can be reached"
+        elif hint := task_hint(mechanism):
+            yield hint
         yield from (f"the loops hardly resist a motion of {nearly_free(motion)}" for motion in mobility.nearly_free)
     for _, joint, body in leaves(mechanism):
         yield f"nothing but joint '{joint.name}' connects '{body}', which so plays no part in where the end effector is"
