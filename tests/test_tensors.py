@@ -208,6 +208,7 @@ def test_machines_without_closed_forms_are_refused_by_name(name: str, said: str,
     [
         ({"joints": ["roll_joint"]}, InvalidArgument, "in series"),
         ({"joints": ["pitch", "roll"]}, UnknownName, "pitch_joint"),
+        ({"joints": "task"}, UnknownName, "no joint named 'task'"),
         ({"backend": "tensorflow"}, InvalidArgument, "backend"),
     ],
 )
