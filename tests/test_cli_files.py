@@ -344,7 +344,7 @@ def test_every_file_that_is_written_is_named() -> None:
         "time stewart path.csv --speed 100 -o b.csv": ["b.csv"],
         "effort stewart path.csv --load platform=1,0,0,200 -o c.csv": ["c.csv"],
         "export stewart c -o a.c": ["a.h", "a.c"],
-        "export stewart --numpy a.py --web a.html": ["a.py", "a.html"],
+        "export stewart --numpy a.py": ["a.py"],
         "plot stewart -o a.svg": ["a.svg"],
         "track stewart path.csv -o - --plot b.svg": ["b.svg"],
     }
