@@ -232,8 +232,8 @@ def limit_name(joint: str, bound: str) -> str:
 
 
 BOUND_NOTES = {
-    "stretched": "stretched: links are in line, or square to a slide, at this joint, and reach no farther",
-    "level": "level: the rod at this joint is square to its slide, and reaches no farther",
+    "stretched": "stretched: the links of this joint are in line, or square to a slide, and reach no farther",
+    "level": "level: the rod of this joint is square to its slide, and reaches no farther",
     "not closed": "not closed: the hinges and rods of a leg do not come together beyond",
 }
 """Bounds that are no limits of a joint, explained."""
