@@ -20,7 +20,7 @@ from .driving import Rates
 from .names import unique
 from .notes import Note, note_names
 from .opened import Loop
-from .urdf_links import friction_of
+from .xml_fields import friction_of
 from .xml_reading import fault
 
 NEWTON_STEPS = 30

@@ -80,13 +80,18 @@ def _kind(tree: ET.Element, place: str, kinds: tuple[Kind, ...]) -> Kind:
     return KINDS[tree.tag]
 
 
-def numbers_in(text: str, count: int) -> Floats | None:
-    """The numbers of a text, with blanks between them, (count,); None where it has others, or not finite ones."""
+def numbers_in(text: str, count: int, endless: bool = False) -> Floats | None:
+    """The numbers of a text, with blanks between them, (count,); None where it has others.
+
+    Parameters
+    ----------
+    endless : True where they may be infinite.
+    """
     try:
         values = np.array([float(word) for word in text.split()])
     except ValueError:
         return None
-    return values if values.shape == (count,) and np.isfinite(values).all() else None
+    return values if values.shape == (count,) and (np.isfinite(values) | (endless & np.isinf(values))).all() else None
 
 
 def number_text(values: Iterable[float]) -> str:
