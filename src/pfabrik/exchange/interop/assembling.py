@@ -31,7 +31,7 @@ from .imported_shapes import with_collision
 from .notes import Note, note_names, noting
 from .opened import OpenMechanism
 from .simplify import combined, merged_balls, merged_bodies
-from .straighten import straighten
+from .straighten import straighten, unlocked
 
 SHOWN = 0.01
 """Share of the largest component of a gap from which another is shown."""
@@ -115,7 +115,8 @@ def closed(opened: OpenMechanism, notes: list[Note]) -> Assembled:
     rigid, stands_for = merged_bodies(merged_balls(structure.joints), opened.base, opened.end_effector)
     exact = straighten(rigid, opened, reference, slack, notes)
     simple = combined(exact, {opened.base, opened.end_effector}, notes)
-    limited = [dataclasses.replace(each, cone=opened.cones.get(each.name, each.cone)) for each in simple]
+    moving = unlocked(simple, opened, reference, slack, notes)
+    limited = [dataclasses.replace(each, cone=opened.cones.get(each.name, each.cone)) for each in moving]
     collision = _moved_collision(opened, loops.tree, home).merged(stands_for)
     return Assembled(_mechanism(opened, limited, reference, notes), gap * loops.length, collision)
 

@@ -176,7 +176,7 @@ def _enough(base: str, end: str, joints: Sequence[Joint], build: Build) -> tuple
     candidates.sort(key=lambda joint: base not in joint.connects)
     known = [joint.name for joint in candidates]
     machine = build(base, end, known)
-    motions = _motions(machine)[0][actuated_columns(machine)]
+    motions = generic_motions(machine)[0][actuated_columns(machine)]
     drives: list[int] = []
     for place in range(len(motions)):
         if _rank(motions[[*drives, place]]) > len(drives):
@@ -190,7 +190,7 @@ def moved_bodies(mechanism: Mechanism) -> Iterator[Moved]:
 
     An actuator moves a body that has more freedoms while this actuator moves and the others rest than with all at rest.
     """
-    motions, screws = _motions(mechanism)
+    motions, screws = generic_motions(mechanism)
     drives, owners = motions[actuated_columns(mechanism)], column_joints(mechanism)
     resting, alone = _null_space(drives), np.linalg.pinv(drives, TOLERANCES.alignment)
     moves = np.diag(drives @ alone) > 1.0 - TOLERANCES.alignment  # else it rests where the others do
@@ -204,7 +204,7 @@ def moved_bodies(mechanism: Mechanism) -> Iterator[Moved]:
         yield Moved(body, _rank(twist), undriven, tuple(by))
 
 
-def _motions(mechanism: Mechanism) -> tuple[Floats, Floats]:
+def generic_motions(mechanism: Mechanism) -> tuple[Floats, Floats]:
     """Independent motions (c, k) of all joints at a generic configuration, and the screws (c, 6) there.
 
     Of configurations that are as good, home comes last: a chain that is straight has fewer freedoms.

@@ -23,6 +23,7 @@ from .collision import NO_COLLISION, Collision
 from .couplings import Coupling, with_coupled_drives
 from .digits import Rounding, worst
 from .driving import Rates, require_drives, with_actuators
+from .first_motion import stuck_drives
 from .imported_masses import with_masses
 from .imported_shapes import with_collision
 from .names import unique
@@ -135,15 +136,20 @@ def _between(robot: Robot, base: str, end_effector: str, asked: ImportOptions, n
 
 
 def _proposals(mechanism: Mechanism, made: Callable[[float], Mechanism]) -> Iterator[Note]:
-    """The least `within` that gives a mechanism more motions, where its loops all but let it have them."""
-    counts = generic_of(mechanism).mobility
-    if not counts.nearly_free and counts.platform > 0:
+    """Drives that move nothing; the least `within` that gives more motions, where loops all but let it have them."""
+    counts, stuck = generic_of(mechanism).mobility, stuck_drives(mechanism)
+    if stuck:
+        what = "no drive moves anything" if len(stuck) == len(mechanism.drives) else "drives that move nothing"
+        yield Note(f"{what}: forward kinematics does not follow 10 deg, or a tenth of a range, from home", stuck)
+    if not (stuck or counts.nearly_free) and counts.platform > 0:
         return
     for within in PROPOSED:
         with suppress(PfabrikError):
-            more = generic_of(made(within)).mobility.platform
-            if more > counts.platform:
+            again = made(within)
+            more = generic_of(again).mobility.platform
+            if more > counts.platform or (stuck and not stuck_drives(again)):
                 wins = f"{counted(more, 'freedom')} of the end effector for {counts.platform}"
+                wins = wins if more > counts.platform else "drives that move it"
                 what = f"the loops lock by little: making what is off by less parallel, equal, or meet gives {wins}"
                 yield Note(f"{what}: try --within {within:g}")
                 return
