@@ -116,9 +116,16 @@ def closed(opened: OpenMechanism, notes: list[Note]) -> Assembled:
     exact = straighten(rigid, opened, reference, slack, notes)
     simple = combined(exact, {opened.base, opened.end_effector}, notes)
     moving = unlocked(simple, opened, reference, slack, notes)
-    limited = [dataclasses.replace(each, cone=opened.cones.get(each.name, each.cone)) for each in moving]
+    limited = [_told(joint, opened) for joint in moving]
     collision = _moved_collision(opened, loops.tree, home).merged(stands_for)
     return Assembled(_mechanism(opened, limited, reference, notes), gap * loops.length, collision)
+
+
+def _told(joint: Joint, opened: OpenMechanism) -> Joint:
+    """A joint with its cone, or as the distance between two joints, where the description says so."""
+    if joint.name in opened.spans:
+        return dataclasses.replace(joint, axis=None, home=0.0, along=opened.spans[joint.name])
+    return dataclasses.replace(joint, cone=opened.cones.get(joint.name, joint.cone))
 
 
 def _closed_home(opened: OpenMechanism, loops: OpenLoops, notes: list[Note]) -> tuple[ClosedHome, OpenMechanism]:
