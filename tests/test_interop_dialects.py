@@ -290,7 +290,7 @@ SPRING = BODIES.format("drake:linear_spring_damper_", ONE, OTHER)
         ("</robot>", f"<gazebo><joint name='E' type='gearbox'>{IN_SDF}</joint></gazebo></robot>", "type 'gearbox'"),
         ("</robot>", "<xacro:include filename='a'/></robot>", "of a file for xacro"),
         ("<link name", "<link/>" * 300_000 + "<link name", "too many"),
-        ("<link name", "".join(f'<joint name="{i}"/>' for i in range(6000)) + "<link name", "joints; expected at most"),
+        ("<link name", "".join(f'<joint name="{i}"/>' for i in range(6000)) + "<link name", "joints, with all"),
         ('name="crank"', 'name="rocker"', "'rocker': found a name that is empty, or used twice"),
         ('name="D" type="continuous"', 'name="D" type="fixed"', "'rocker', which is fixed to 'ground'"),
     ],

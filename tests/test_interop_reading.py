@@ -6,6 +6,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import re
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -446,7 +447,10 @@ FAR = {**PLAIN, "loops": [{**PLAIN["loops"][0], "at": [[0.1, 0.1, 0], [-0.1, 3.0
         (lambda: from_mjcf("<mujoco/>\0"), ["no XML"]),
         (lambda: from_mjcf("<robot/>"), ["expected <mujoco>"]),
         (lambda: from_mjcf(IN_WORLD.format("<body pos='a b c'/>")), ["what MuJoCo does not compile"]),
-        (lambda: from_mjcf(IN_WORLD.format("<replicate count='1000000'><body/></replicate>")), ["1000000 copies"]),
+        (
+            lambda: from_mjcf(IN_WORLD.format("<replicate count='1000000'><body/></replicate>")),
+            ["1000000 bodies"],
+        ),
         (lambda: from_mjcf(IN_WORLD.format("<flexcomp name='f' file='x.msh'/>")), ["flexible"]),
         (lambda: from_mjcf("<mujoco><include file='other.xml'/></mujoco>"), ["no folder"]),
         (lambda: from_urdf(MISSPELT.replace('"-0.05 0 0"', '"-0.05 0"')), ["contineous", "r9", "'-0.05 0'"]),
@@ -861,3 +865,32 @@ FOUR_BAR = """
         <site name="foot" pos="0 0 -0.15"/></body></body></body></worldbody>
   <equality><connect name="D" site1="foot" site2="ground"/></equality>
   <actuator><motor joint="A"/></actuator></mujoco>"""
+
+
+def in_urdf(count: int, kind: str) -> str:
+    links = "".join(
+        f'<link name="l{k}"/><joint name="j{k}" type="{kind}"><parent link="base"/><child link="l{k}"/></joint>'
+        for k in range(count)
+    )
+    return f'<robot name="r"><link name="base"/>{links}</robot>'
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("<mujoco><worldbody>" + "<body><joint/></body>" * 4_000 + "</worldbody></mujoco>", "4000 joints"),
+        ("<mujoco><worldbody>" + "<body/>" * 10_000 + "</worldbody></mujoco>", "10000 bodies"),
+        ("<mujoco><equality>" + '<connect body1="a" anchor="0 0 0"/>' * 400 + "</equality></mujoco>", "400 loops"),
+        ("<mujoco><worldbody>" + "<site/>" * 150_000 + "</worldbody></mujoco>", "150000 sites"),
+        (in_urdf(4_000, "revolute"), "4000 joints"),
+        (in_urdf(6_000, "fixed"), "6001 links"),
+        ("<sdf><model>" + "<joint type='ball'/>" * 4_000 + "</model></sdf>", "4000 joints"),
+        ("<mujoco><worldbody>" + "<replicate count='90'>" * 3 + "<site/>" + "</replicate>" * 3, "sites"),
+    ],
+)
+def test_a_model_of_more_parts_than_any_robot_has_is_refused_at_once(text: str, said: str) -> None:
+    text += "</worldbody></mujoco>" if text.endswith("</replicate>") else ""
+    read, before = from_mjcf if text.startswith("<mujoco>") else from_urdf, time.process_time()
+    error = refused(lambda: read(text, end_effector="e"))
+    assert said in str(error) and "at most" in str(error)
+    assert time.process_time() - before < 2.0

@@ -65,9 +65,6 @@ TRANSMISSIONS = ("tendon", "site", "body", "slidersite", "cranksite")
 LEAST = "1e-9"
 """Mass [kg], and moment of inertia [kg m²], of a body for which the file has none."""
 
-MOST_COPIES = 1000
-"""Most copies that `replicate` may make, of copies too."""
-
 STILL = ("option", "size", "visual", "statistic", "custom", "extension", "include")
 """Sections that neither move nor hold anything."""
 
@@ -145,9 +142,7 @@ def bare_model(root: ET.Element) -> ET.Element:
     return bare
 
 
-def kept(
-    element: ET.Element, omitted: Counter[str], is_kept: Callable[[ET.Element, bool], bool], copies: int = 1
-) -> ET.Element:
+def kept(element: ET.Element, omitted: Counter[str], is_kept: Callable[[ET.Element, bool], bool]) -> ET.Element:
     """An element, with its attributes that are known and those of its descendants that are kept.
 
     Parameters
@@ -155,16 +150,12 @@ def kept(
     omitted : the others, which are counted.
     is_kept : of an element, and whether it is one of defaults.
     """
-    if element.tag == "replicate":
-        copies *= max(1, int(number(element, "count")))
-        if copies > MOST_COPIES:
-            raise fault("replicate", f"{copies} copies", f"at most {MOST_COPIES}")
     copy = ET.Element(element.tag, _attributes(element))
     for child in element:
         if child.tag in REFUSED:
             raise fault(str(child.tag), REFUSED[child.tag], "bodies one by one, as MuJoCo saves a compiled model")
         if is_kept(child, element.tag == "default"):
-            copy.append(kept(child, omitted, is_kept, copies))
+            copy.append(kept(child, omitted, is_kept))
         elif element.tag != "default":
             omitted[child.tag] += 1
     return copy

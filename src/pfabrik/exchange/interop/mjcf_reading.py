@@ -128,6 +128,7 @@ def _robot(root: ET.Element, model: MjcfModel, notes: list[Note]) -> Robot:
     joints, loops = list(model.joints(notes)), list(model.loops(notes))
     names = [*(part for joint in joints for part in (joint.name, *joint.connects)), *(loop.name for loop in loops)]
     legs = list(tendon_legs(model, names, notes))
+    places |= {body: (body, point) for leg in legs for body, point in leg.places.items()}
     joints, loops = [*joints, *(part for leg in legs for part in leg.joints)], [*loops, *(leg.end for leg in legs)]
     note_names(notes, "straight tendons are legs of a universal joint, a slide and a ball", (leg.name for leg in legs))
     taken = [*(joint.name for joint in joints), *(loop.name for loop in loops)]

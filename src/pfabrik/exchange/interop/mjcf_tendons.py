@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...common.arrays import Floats
 from ...common.rotations import square_to
 from ...machine.description.joints import Joint
 from ...tolerances import TOLERANCES
@@ -37,6 +38,12 @@ class TendonLeg(NamedTuple):
     def span(self) -> tuple[str, str]:
         """The two joints whose distance is the tendon's length."""
         return self.joints[0].name, self.end.name
+
+    @property
+    def places(self) -> dict[str, Floats]:
+        """Its two bodies, and the site that each is at (3,) [m]."""
+        cylinder, rod = self.joints[1].connects
+        return {cylinder: np.array(self.joints[0].at), rod: self.end.at[0]}
 
 
 def tendon_legs(model: MjcfModel, taken: Collection[str], notes: list[Note]) -> Iterator[TendonLeg]:

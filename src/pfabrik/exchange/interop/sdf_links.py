@@ -17,7 +17,7 @@ from ...machine.description.joints import Joint
 from .digits import FEWEST, NOTHING, Rounding, digits_of
 from .notes import Note, note_names
 from .told_loops import named_in
-from .urdf_links import HERE, MOST_FAULTS, UrdfJoint, UrdfLinks, frame_at, require_few
+from .urdf_links import HERE, MOST_FAULTS, UrdfJoint, UrdfLinks, frame_at
 from .xml_fields import Field, coupling_of, drive_of, read_fields, rotor_of, text_at
 from .xml_reading import fault, number, numbers_in
 
@@ -160,7 +160,6 @@ def read_sdf(root: ET.Element, asked: Collection[str], notes: list[Note]) -> Urd
     model = only_model(root, notes)
     name = model.get("name", "mechanism")
     place, poses = f"model '{name}'", Poses(model, {})
-    require_few(model)
     counts = Counter(each.get("name", "") for each in model if each.tag in ("link", "frame", "joint"))
     for each in [each for each, count in counts.items() if count > 1 or each in ("", WORLD, MODEL)]:
         raise fault(place, f"the name '{each}', which is empty, reserved or used twice", "a name of its own")

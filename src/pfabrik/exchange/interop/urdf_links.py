@@ -23,8 +23,8 @@ from .xml_reading import fault, number_text, numbers_in
 TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "ball", "spherical", "universal")
 """Joint types that are read: those of URDF, and those that Drake and MuJoCo add."""
 
-MOST_PARTS, MOST_FAULTS = 5_000, 20
-"""Most links or joints of a robot: a humanoid with every bolt ten times; and most faults that are told at once."""
+MOST_FAULTS = 20
+"""Most faults that are told at once."""
 
 ZERO, X = "0 0 0", "1 0 0"
 PLACED = {
@@ -166,7 +166,6 @@ def read_links(root: ET.Element, retyped: Mapping[str, str], asked: Collection[s
     retyped : joint -> its type, in place of that of the description.
     asked : names of the joints that a caller drives or holds.
     """
-    require_few(root)
     joints = _joints(root, retyped)
     first: dict[str, UrdfJoint] = {}
     for joint in joints:
@@ -229,13 +228,6 @@ def _add_gears(root: ET.Element, joints: dict[str, UrdfJoint]) -> None:
         rotor = rotor_of(element.find("actuator"), f"transmission '{element.get('name', '')}'", [])
         for joint in [each for each in joints.values() if rotor != (None, None) and each.name in moved]:
             joints[joint.child] = replace(joint, rotor=rotor)
-
-
-def require_few(robot: ET.Element) -> None:
-    """Refuse a robot of more links, joints or frames than any has."""
-    for tag in ("joint", "link", "frame"):
-        if (count := len(robot.findall(tag))) > MOST_PARTS:
-            raise fault("robot", f"{count} {tag}s", f"at most {MOST_PARTS}")
 
 
 def outward_from(root: str, joints: Iterable[UrdfJoint]) -> list[UrdfJoint]:
