@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar, cast
 
 Owner = TypeVar("Owner")
 P = ParamSpec("P")
@@ -12,6 +12,9 @@ Value = TypeVar("Value")
 
 MOST = 256
 """Most values of one function with other arguments that an object keeps: options may vary from call to call."""
+
+
+_NOTHING = object()
 
 
 def derived(function: Callable[Concatenate[Owner, P], Value]) -> Callable[Concatenate[Owner, P], Value]:
@@ -23,15 +26,15 @@ def derived(function: Callable[Concatenate[Owner, P], Value]) -> Callable[Concat
 
     @wraps(function)
     def once(owner: Owner, /, *args: P.args, **kwargs: P.kwargs) -> Value:
-        values: dict[Any, Value] = owner.__dict__
+        values: dict[Any, Any] = owner.__dict__
         key: Any = name
         if args or kwargs:
             values = owner.__dict__.setdefault(name, {})
             key = args, *kwargs.items()
-        try:
-            return values[key]
-        except KeyError:
-            value = function(owner, *args, **kwargs)
+        found = values.get(key, _NOTHING)
+        if found is not _NOTHING:
+            return cast(Value, found)
+        value = function(owner, *args, **kwargs)
         if len(values) >= MOST and key is not name:
             values.clear()
         values[key] = value

@@ -30,6 +30,7 @@ from .imported_masses import with_masses
 from .imported_shapes import with_collision
 from .notes import Note, note_names, noting
 from .opened import OpenMechanism
+from .short_numbers import short_joint, shortened
 from .simplify import combined, merged_balls, merged_bodies
 from .straighten import straighten, unlocked
 
@@ -116,7 +117,8 @@ def closed(opened: OpenMechanism, notes: list[Note]) -> Assembled:
     exact = straighten(rigid, opened, reference, slack, notes)
     simple = combined(exact, {opened.base, opened.end_effector}, notes)
     moving = unlocked(simple, opened, reference, slack, notes)
-    limited = [_told(joint, opened) for joint in moving]
+    limited = [short_joint(_told(joint, opened), loops.length) for joint in moving]
+    reference = None if reference is None else shortened(reference, loops.length)
     collision = _moved_collision(opened, loops.tree, home).merged(stands_for)
     return Assembled(_mechanism(opened, limited, reference, notes), gap * loops.length, collision)
 

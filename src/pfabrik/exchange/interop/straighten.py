@@ -155,7 +155,7 @@ def _roundings(given: Structure, opened: OpenMechanism, size: float, below: floa
     aligned = Rounding(TOLERANCES.alignment * size, TOLERANCES.file_angle) if known else NOTHING
     roundings = []
     for index, joint in enumerate(joints):
-        parts = [known[name] for name in joint.name.split("+") if name in known]
+        parts = [known[name] for name in (joint.name, *joint.merged) if name in known]
         rounding, most = worst(parts) if parts else coarsest, coarsest if index in locked else aligned
         roundings.append(Rounding(min(rounding.length, most.length), min(rounding.angle, most.angle)))
     return roundings

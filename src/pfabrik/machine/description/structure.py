@@ -182,12 +182,13 @@ class Structure:
 
     @cached_property
     def _by_name(self) -> dict[str, Joint]:
-        return {joint.name: joint for joint in self.joints}
+        hinges = {name: joint for joint in self.joints for name in joint.merged}
+        return hinges | {joint.name: joint for joint in self.joints}
 
     def joint(self, name: str) -> Joint:
-        """The joint of that name; `UnknownName` if there is none."""
+        """The joint of that name, or that a hinge of that name is part of; `UnknownName` if there is none."""
         if not isinstance(name, str) or name not in self._by_name:
-            raise UnknownName("joint", name, self._by_name)
+            raise UnknownName("joint", name, [joint.name for joint in self.joints])
         return self._by_name[name]
 
     def home_coordinate(self, name: str) -> float | tuple[float, ...]:
