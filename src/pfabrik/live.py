@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .answers.active_limits import stretched_joint
 from .answers.answer_fields import PoseRequest
 from .answers.pace import pace_of
 from .answers.solution import Solution
@@ -231,6 +232,9 @@ class Live:
             return ()
         found = self._driven.multipliers()
         most = max(found.values(), default=0.0)
+        if not most > 0.0:  # where all links of a leg are in one line, its reach has no slope
+            stretched = stretched_joint(model_of(self.mechanism), self._driven.coordinates())
+            return tuple(f"{each.joint} {each.bound}" for each in stretched)
         return tuple(
             " ".join(limit) for limit, value in sorted(found.items(), key=lambda each: -each[1]) if value > 1e-6 * most
         )
