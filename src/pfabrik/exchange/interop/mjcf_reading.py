@@ -52,13 +52,13 @@ def from_mjcf(
     Hinges, slides, balls and free joints, several on one body too, become joints between bodies; `connect` becomes a
     ball, two between the same bodies a hinge, `weld` makes two bodies one; sites `closing_<name>_1` and
     `closing_<name>_2` meet in a ball. A straight tendon between two sites that an actuator pulls, or whose length is
-    limited, becomes a universal joint, a slide that counts its length, and a ball. Coordinates count as `qpos` does. Of a whole robot, what the end effector's
-    motion against the base does not depend on is left out. Loops that are open are closed by moving passive joints.
-    Base coordinates are those of the world at the configuration. Geoms that collide become shapes of their bodies; what
-    the file lets pass through each other, and what overlaps at home, may touch (`ignore`). Masses are those of
-    inertial elements, or of geoms that are no meshes, as MuJoCo has them. Of a driven joint, armature, friction, and
-    the most that its actuators exert are read: the smaller side of `forcerange`, of `ctrlrange` where control is a
-    force, both by the gear, and of `actuatorfrcrange`.
+    limited, becomes a universal joint, a slide that counts its length, and a ball. Coordinates count as `qpos` does. Of
+    a whole robot, what the end effector's motion against the base does not depend on is left out. Loops that are open
+    are closed by moving passive joints. Base coordinates are those of the world at the configuration. Geoms that
+    collide become shapes of their bodies; what the file lets pass through each other, and what overlaps at home, may
+    touch (`ignore`). Masses are those of inertial elements, or of geoms that are no meshes, as MuJoCo has them. Of a
+    driven joint, armature, friction, and the most that its actuators exert are read: the smaller side of `forcerange`,
+    of `ctrlrange` where control is a force, both by the gear, and of `actuatorfrcrange`.
 
     Parameters
     ----------
