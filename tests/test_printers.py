@@ -413,3 +413,41 @@ def test_a_size_that_another_file_decides_is_refused(tmp_path: Path) -> None:
     (tmp_path / "Configuration.h").write_text(SIZES.format("ENABLED(OF_ANOTHER_FILE)"))
     with pytest.raises(InvalidMechanism, match="two values, and names of another file say which"):
         pf.load(tmp_path / "Configuration.h")
+
+
+DELTESIAN = """[printer]
+kinematics: deltesian
+[stepper_left]
+position_endstop: 311
+arm_length: 217
+arm_x_length: 160
+[stepper_right]
+{right}
+[stepper_y]
+position_min: {lowest}
+position_max: 210
+"""
+
+
+@pytest.mark.parametrize(
+    ("right", "x_right", "arm_right", "lowest"),
+    [("", 160.0, 217.0, 0.0), ("arm_length: 218.5\narm_x_length: 161.5", 161.5, 218.5, 12.0)],
+)
+def test_a_deltesian_is_where_klipper_has_it(
+    right: str, x_right: float, arm_right: float, lowest: float, tmp_path: Path
+) -> None:
+    """A carriage of Klipper's deltesian is at sqrt(arm² - (x - its x)²) + z; its third stepper counts y."""
+    file = tmp_path / "printer.cfg"
+    file.write_text(DELTESIAN.format(right=right, lowest=lowest))
+    machine = pf.load(file)
+    assert machine.actuator_names == ("carriage_left", "carriage_right", "carriage_y")
+    tops = [machine.joint(name).range[1] for name in ("carriage_left", "carriage_right")]
+    assert tops == pytest.approx([311 + np.sqrt(217**2 - 160**2), 311 + np.sqrt(arm_right**2 - x_right**2)])
+    for x, y, z in ((0, 12, 0), (50, 40, 100), (-50, 209, 10), (20, 90, 250)):
+        answer = pf.solve_ik(machine, [x, y, z])
+        left, right_ = np.sqrt(217**2 - (x + 160) ** 2) + z, np.sqrt(arm_right**2 - (x - x_right) ** 2) + z
+        assert answer and answer.actuators == pytest.approx([left, right_, y], abs=EXACT * 100)
+        assert pf.solve_fk(machine, answer.actuators).pose[:3, 3] == pytest.approx([x, y, z], abs=1e-6)
+    file.write_text(DELTESIAN.format(right="", lowest=300))
+    with pytest.raises(InvalidMechanism, match="position_max: found 210"):
+        pf.load(file)
