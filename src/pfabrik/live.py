@@ -61,6 +61,8 @@ class Live:
         What is held out of reach, as in `Options`.
     hold_price : float
         Up to which, as in `Options`.
+    rotation_length : float, optional
+        Which distance a rotation counts as, per radian, as in `Options` [length].
     start : Solution or array (nq,), optional
         Where the machine is. Default: home.
 
@@ -88,10 +90,11 @@ class Live:
         acceleration: float | Mapping[str, float] | None = None,
         hold: Literal["orientation", "position"] | None = "orientation",
         hold_price: float = 10.0,
+        rotation_length: float | None = None,
         start: Start | None = None,
     ) -> None:
         self.mechanism = checked_mechanism(mechanism)
-        self.options = Options(hold=hold, hold_price=hold_price)
+        self.options = Options(hold=hold, hold_price=hold_price, rotation_length=rotation_length)
         speeds = drive_limits(mechanism, "speed", speed)
         self._limits = speeds, drive_limits(mechanism, "acceleration", acceleration)
         free = [name for name, most in zip(mechanism.actuator_names, speeds, strict=True) if most == math.inf]
@@ -253,6 +256,7 @@ class Live:
             acceleration=acceleration,
             hold=self.options.hold,
             hold_price=self.options.hold_price,
+            rotation_length=self.options.rotation_length,
             start=self.q,
         )
         return made, (self.mechanism,)
