@@ -471,6 +471,13 @@ def test_joints_that_become_one_keep_the_names_that_their_file_has(tmp_path: Pat
         pf.actuation(ankle, joints=("pitch+roll", "roll"))
     with pytest.raises(InvalidArgument, match="no coordinate"):
         pf.actuation(ankle, joints=("pitch",))
+    assert ankle.with_limits({"roll": (-0.5, 0.4)}).joint("pitch").range == ((-1.0, 1.0), (-0.5, 0.4))
+    both = ankle.with_limits(pitch=(-0.2, 0.1), roll=(-0.5, 0.4))
+    assert both.joint("roll").range == ((-0.2, 0.1), (-0.5, 0.4))
+    with pytest.raises(InvalidArgument, match="a range; None or a cone is for 'pitch"):
+        ankle.with_limits(roll=None)
+    answer = pf.solve_fk(ankle, motors[0])
+    assert str(pf.transmission(answer, joint="roll")) == str(pf.transmission(answer, joint="pitch+roll"))
     file = tmp_path / "ankle.toml"
     pf.save(ankle, file)
     words = ["export", str(file), "--numpy", str(tmp_path / "ankle.py"), "--joints", "pitch,roll"]

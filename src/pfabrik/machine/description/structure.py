@@ -116,6 +116,11 @@ class Structure:
         return tuple(found)
 
     @cached_property
+    def coordinates_by_name(self) -> dict[str, JointCoordinate]:
+        """Name of each coordinate, and of the hinge that it was where two became one -> the coordinate."""
+        return {each.alias: each for each in self.coordinates} | {each.name: each for each in self.coordinates}
+
+    @cached_property
     def drives(self) -> tuple[JointCoordinate, ...]:
         """The actuated coordinates, in the order of `actuator_names`."""
         return tuple(each for each in self.coordinates if each.place in each.joint.driven)

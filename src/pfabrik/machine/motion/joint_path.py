@@ -53,8 +53,7 @@ def named_coordinates(mechanism: Mechanism, names: tuple[str, ...]) -> list[Join
     """The coordinates that names of joints or coordinates stand for, in their order."""
     if not names:
         raise InvalidArgument("joints", "no joint", _expected(mechanism))
-    by_name = {each.alias: [replace(each, name=each.alias)] for each in mechanism.coordinates}
-    by_name |= {each.name: [each] for each in mechanism.coordinates}
+    by_name = {name: [replace(each, name=name)] for name, each in mechanism.coordinates_by_name.items()}
     for joint in mechanism.joints:
         by_name[joint.name] = [each for each in mechanism.coordinates if each.joint.name == joint.name]
     for name in names:
