@@ -94,8 +94,8 @@ print(f"{live.lag:.0f} mm from the target, at rest; held by {', '.join(sorted(li
 #
 # ## By hand
 #
-# The page of a machine (`pfabrik export stewart --web stewart.html`, `pfabrik view stewart`) has a switch, *Live*, and a
-# slider of the speed beside it: drag the platform far away, and see how the machine follows and what holds it.
+# The page of a machine (`pfabrik export stewart --web stewart.html`, `pfabrik view stewart`) has a switch, *Live*, and
+# a slider of the speed beside it: drag the platform far away, and see how the machine follows and what holds it.
 #
 # ## What it costs
 #
