@@ -151,6 +151,7 @@ def cells_over(curve: Curve, timing: Timing, limits: Limits, before: Timing | No
     looked_at = np.ones(len(over), bool)
     if before is not None:  # x is straight between points
         differs = np.abs(np.interp(timing.s, before.s, before.x) - timing.x) > SAME * timing.x.max()
+        differs |= ~np.isin(timing.s, before.s)
         looked_at = differs[1:] | differs[:-1]
     for cells in _blocks(np.flatnonzero(looked_at)):
         over[cells] = (_used(curve, timing, limits, cells, LOOKS) > 1.0 + 0.5 * EXCEEDED).any(axis=(1, 2))
