@@ -68,7 +68,7 @@ def time_path(
     torque : float or mapping of str to float, optional
         The most that actuators exert, by name or the same for all [N m, of slides N]; those not named have the
         `max_torque` of their joints, which counts where the machine has the masses of all bodies. Rotors and friction
-        are included, as in `inverse_dynamics`; between some hundred places of the path torques are a spline. Redundant
+        are included, as in `inverse_dynamics`. Redundant
         actuators share what they do in any way that keeps their limits: at these are several at once. What the timing
         exceeds is in `exceeded`.
     loads : mapping of str to tuple, optional
