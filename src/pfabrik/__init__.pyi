@@ -33,7 +33,7 @@ from .answers.tracked import Track as Track
 from .capabilities.actuation.actuation import Actuation as Actuation
 from .capabilities.actuation.actuation import actuation as actuation
 from .capabilities.calibration.calibration import Calibration as Calibration
-from .capabilities.calibration.csv_measurements import read_measurements as read_measurements
+from .capabilities.calibration.read_measurements import read_measurements as read_measurements
 from .capabilities.calibration.least_squares import calibrate as calibrate
 from .capabilities.calibration.measurements import Measurements as Measurements
 from .capabilities.calibration.parameters import Parameters as Parameters

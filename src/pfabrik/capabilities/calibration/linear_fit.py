@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,28 @@ from ...common.arrays import Floats, Ints, Mask
 RANK = 1e-8
 """Singular value, as a share of the largest, up to which a direction of parameters leaves measurements unchanged:
 derivatives are exact to 1e-10, and what decides, at 1e-5 and above, is far from it."""
+
+
+FALSE, LEAST_OTHERS = 0.01, 2
+"""How often noise alone may name a measurement that does not fit; and how many numbers are to be left over without it:
+of one, all measurements are as far off as each other."""
+
+
+class LeftOut(NamedTuple):
+    """Measurements beside what the others predict of them.
+
+    Attributes
+    ----------
+    numbers : of the measurements, (k,).
+    raw : root mean square residual of each, (k,).
+    student : the same in standard deviations, (k,); as the others show them where none are given.
+    chances : how often noise would put this one so far off, (k,); NaN where too little is left over to tell.
+    """
+
+    numbers: Ints
+    raw: Floats
+    student: Floats
+    chances: Floats
 
 
 @dataclass(frozen=True)
@@ -24,12 +47,14 @@ class LinearFit:
     residual : (m,), in standard deviations, or as lengths where none are given.
     groups : the measurement of every residual, (m,).
     has_sigma : True if standard deviations are given.
+    least_noise : deviation of a residual at least, where none are given: simulated ones are off by rounding.
     """
 
     jacobian: Floats
     residual: Floats
     groups: Ints
     has_sigma: bool
+    least_noise: float
 
     @cached_property
     def _decomposed(self) -> tuple[Floats, Floats, Floats]:
@@ -108,11 +133,13 @@ class LinearFit:
         shift = spread @ (rest.T @ self.residual) / self.variance
         return np.asarray(moved @ (spread + np.outer(shift, shift)) @ moved.T)
 
-    def left_out(self) -> tuple[Ints, Floats, Floats]:
-        """Measurements, and the root mean square residual of each from what the others predict, also studentised."""
+    def left_out(self) -> LeftOut:
+        """How far every measurement is from what the others predict."""
+        from scipy.special import chdtrc, fdtrc
+
         left = self._decomposed[0][:, : self.rank]
         numbers = np.unique(self.groups)
-        raw, student = np.full(len(numbers), np.nan), np.full(len(numbers), np.nan)
+        raw, student, chances = (np.full(len(numbers), np.nan) for _ in range(3))
         total = float(self.residual @ self.residual)
         for k, number in enumerate(numbers):
             rows = np.flatnonzero(self.groups == number)
@@ -124,12 +151,49 @@ class LinearFit:
             parts = vectors[:, seen].T @ self.residual[rows]
             predicted = vectors[:, seen] @ (parts / values[seen])
             raw[k] = float(np.sqrt(np.mean(predicted**2)))
-            explained = float(parts @ (parts / values[seen]))
-            others = self.spare - int(seen.sum())
-            scale = 1.0 if self.has_sigma else (total - explained) / others if others > 0 else float("nan")
+            explained, count = float(parts @ (parts / values[seen])), int(seen.sum())
+            others = self.spare - count
+            of_others = max(total - explained, 0.0) / others if others > 0 else np.nan
+            scale = 1.0 if self.has_sigma else of_others
             if scale > 0.0:
-                student[k] = float(np.sqrt(explained / seen.sum() / scale))
-        return numbers, raw, student
+                student[k] = float(np.sqrt(explained / count / scale))
+            if others < LEAST_OTHERS:
+                continue
+            beside = max(of_others, 1.0 if self.has_sigma else self.least_noise**2)
+            chances[k] = fdtrc(count, others, explained / count / beside)
+            if self.has_sigma:
+                chances[k] = max(chances[k], chdtrc(count, explained))
+        return LeftOut(numbers, raw, student, chances)
+
+    def outliers(self, most: int) -> list[tuple[int, float]]:
+        """Numbers of the measurements that do not fit, and their studentised residuals, the worst first.
+
+        One at a time: what one of them has spoiled does not count against the next. Noise alone names any in one of a
+        hundred fits: residuals follow the F distribution (Student's t, of one number), of as many as there are.
+        """
+        named: list[tuple[int, float]] = []
+        fit = self
+        while len(named) < most:
+            each = fit.left_out()
+            told = np.flatnonzero(np.isfinite(each.chances))
+            if not len(told) or each.chances[told].min() * len(told) > FALSE:
+                break
+            worst = told[np.lexsort((-each.student[told], each.chances[told]))[0]]
+            named.append((int(each.numbers[worst]), float(each.student[worst])))
+            fit = fit._without(int(each.numbers[worst]))
+        return named
+
+    def _without(self, number: int) -> LinearFit:
+        """The fit of the other measurements, to first order."""
+        kept = self.groups != number
+        rest = replace(self, jacobian=self.jacobian[kept], residual=self.residual[kept], groups=self.groups[kept])
+        across = rest._decomposed[0][:, : rest.rank]
+        return replace(rest, residual=rest.residual - across @ (across.T @ rest.residual))
+
+
+LEAST_NOISE = 1e-5
+"""Error that measurements of unknown quality are taken to have at least [L]: 10 um of 1 m. Simulated ones have none, and
+would seem to determine what no instrument shows."""
 
 
 def decomposed(matrix: Floats) -> tuple[Floats, Floats, Floats]:
