@@ -185,15 +185,16 @@ class _Problem:
         blocks = self._blocks(values, slopes=True)
         every = self.factors[:, None] * slopes_of(blocks) * self.own.scales
         groups = np.concatenate([block.groups for block in blocks])
+        kinds = np.repeat(np.arange(len(blocks)), [len(block.groups) for block in blocks])
         has_sigma, least = self.fit.measurements.has_deviations, LEAST_NOISE * self.fit.length
         residual = self.factors * residuals(blocks)
-        data = LinearFit(every * self.free, residual, groups, has_sigma, least)
+        data = LinearFit(every * self.free, residual, groups, kinds, has_sigma, least)
         fitted = data
         if self.priors:
             every = np.concatenate([every, self._prior_slopes()])
             left = np.concatenate([residual, (values[self.places] - self.prior_values) / self.prior_sigmas])
-            numbers = np.concatenate([groups, np.full(len(self.places), -1)])
-            fitted = LinearFit(every * self.free, left, numbers, has_sigma, least)
+            numbers = [np.concatenate([each, np.full(len(self.places), -1)]) for each in (groups, kinds)]
+            fitted = LinearFit(every * self.free, left, *numbers, has_sigma, least)
         before = self.factors * residuals(self.before)
         by_quantity = {block.quantity: block.residual for block in blocks}
         given = self.own, self.fit.measurements, values, self.priors
