@@ -27,6 +27,9 @@ from .path import BLOCK, MOST_STEPS, Path, joined
 from .sampling import at_rate, divided, timed
 
 GCODE = (".gcode", ".nc", ".ngc", ".g", ".gco", ".tap")
+PRINTERS = (".gcode", ".g", ".gco")
+"""Endings of programs, and those of printers' among them."""
+
 CHORD, LONGEST = 1e-5, 1e-2
 """Largest distance of a chord from its arc, and longest straight part of a move, as shares of L."""
 
@@ -51,8 +54,9 @@ def read_path(
     others are handed on, and coordinates that the machine cannot change may be missing. In place of a pose there may be
     the coordinates of joints in series from base to end effector (pitch_joint, roll_joint; pivot[0], pivot[1]), angles
     in degrees or with _deg or _rad behind their names. G-code, by its file's ending or
-    if the first line is no header, begins at home and has G0 to G3, planes, G20, G21, G90, G91 and F per minute; A, B,
-    C are roll, pitch, yaw [deg]. Its moves come in steps.
+    if the first line is no header, begins at home and has G0 to G4, planes, G20, G21, G90, G91 and F per minute; A, B,
+    C are roll, pitch, yaw [deg]. Its moves come in steps. A dwell (G4) holds the pose for its time: S in s, P in ms in
+    printers' programs (.gcode, .g, .gco, or with E) and in s in others, as LinuxCNC and Grbl have it.
 
     Parameters
     ----------
@@ -118,7 +122,8 @@ def path_blocks(
         else:
             step = LONGEST * length if longest is None else longest
             passed: dict[str, int] = {}
-            program = steps_of(lines, _home(mechanism), mechanism.length_unit, chord, step, passed)
+            is_printers = file.suffix.lower() in PRINTERS
+            program = steps_of(lines, _home(mechanism), mechanism.length_unit, chord, step, passed, is_printers)
             blocks, has_times = _program(program, passed, most), True
         if has_times or sample_time is not None or rate is not None:
             blocks = timed(blocks, sample_time, rapid)
@@ -181,7 +186,8 @@ def _program(steps: Iterator[Move], passed: dict[str, int], most: int) -> Iterat
         places = np.array([step.place for step in part])
         targets = pose(places[:, :3], rpy=places[:, 3:], degrees=True)
         feeds, lines = np.array([step.feed for step in part]), [step.line for step in part]
-        yield Path(targets, None, feeds, lines, {}, ("deg", "deg", "deg"), dict(passed))
+        dwells = np.array([step.dwell for step in part])
+        yield Path(targets, None, feeds, lines, {}, ("deg", "deg", "deg"), dict(passed), dwells)
     if count < 2:
         raise WrongText("no moves; expected CSV or G-code")
 
