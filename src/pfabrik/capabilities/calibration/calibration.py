@@ -375,9 +375,7 @@ class Calibration(Printed):
             *([self.doubt] if self.doubt else []),
             *self.undetermined,
             *([] if self.determined.all() else [AS_DESCRIBED]),
-            *(
-                f"{each.name} does not fit: off by {each.residual:.1f} standard deviations" for each in self.outliers
-            ),
+            *(f"{each.name} does not fit: off by {each.residual:.1f} standard deviations" for each in self.outliers),
         ]
 
 

@@ -211,8 +211,8 @@ class LinearFit:
 
 
 LEAST_NOISE = 1e-5
-"""Error that measurements of unknown quality are taken to have at least [L]: 10 um of 1 m. Simulated ones have none, and
-would seem to determine what no instrument shows."""
+"""Error that measurements of unknown quality are taken to have at least [L]: 10 um of 1 m. Simulated ones have none,
+and would seem to determine what no instrument shows."""
 
 
 def decomposed(matrix: Floats) -> tuple[Floats, Floats, Floats]:

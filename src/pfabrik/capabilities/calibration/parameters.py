@@ -45,7 +45,7 @@ class Parameters:
     units : tuple of str
         The mechanism's unit of length, "rad", or "" for a dimension, which is as its file has it.
     scales : array (p,)
-        Changes that would be noticed: L, 1 rad, or of a dimension what moves some joint by L, or turns an axis by 1 rad.
+        Changes that would be noticed: L, 1 rad, or of a dimension what moves a joint by L or turns an axis by 1 rad.
     moves : array (p, 2, 6)
         Derivatives of the instrument's frame and target, a rotation vector and a place each.
     factors : array (p, n_a)

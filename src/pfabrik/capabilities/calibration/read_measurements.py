@@ -1,4 +1,4 @@
-"""Measurements from files: tables of actuators, or of what was commanded, and quantities; what printers' probes wrote."""
+"""Measurements from files: tables of actuators or of what was commanded, and what printers' probes wrote."""
 
 from __future__ import annotations
 

@@ -277,9 +277,7 @@ def _obey(state: ModalState, words: dict[str, list[float]], number: int) -> None
             state.unit = state.units[int(code)]
         elif code in (90, 91):
             state.is_relative = code == 91
-        elif code == 4 and is_dwell(words):
-            continue
-        elif code in RETRACTS and not has_offset(f"G{code:g}", words, AXES):
+        elif (code == 4 and is_dwell(words)) or (code in RETRACTS and not has_offset(f"G{code:g}", words, AXES)):
             continue
         elif code in LEVELLING:
             state.passed.setdefault(f"G{code:g}", number)

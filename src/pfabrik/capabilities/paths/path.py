@@ -101,5 +101,7 @@ def joined(blocks: Iterable[Path]) -> Path:
         lines=[line for each in parts for line in each.lines],
         others={name: [cell for each in parts for cell in each.others[name]] for name in first.others},
         passed=parts[-1].passed,
-        dwells=None if first.dwells is None else np.concatenate([each.dwells for each in parts if each.dwells is not None]),
+        dwells=None
+        if first.dwells is None
+        else np.concatenate([each.dwells for each in parts if each.dwells is not None]),
     )
