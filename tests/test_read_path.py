@@ -61,8 +61,33 @@ def test_an_arc_by_its_radius_and_a_helix(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.linalg.norm(helix[:, :2] - helix[0, :2] - [5.0, 0.0], axis=1), 5.0, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("ending", "dwell", "seconds"),
+    [
+        (".gcode", "G4 P500", 0.5), (".g", "G04 P500", 0.5), (".gcode", "G4 S2", 2.0), (".gcode", "G4 P100 S2", 2.0),
+        (".ngc", "G4 P0.5", 0.5), (".nc", "G4 P1", 1.0), (".ngc", "G1 E2\nG4 P500", 0.5), (".nc", "G4 F3", 3.0),
+        (".gcode", "G4", 0.0), (".ngc", "G4 P0", 0.0),
+    ],
+)  # fmt: skip
+def test_a_dwell_holds_the_pose_for_its_time(ending: str, dwell: str, seconds: float, tmp_path: Path) -> None:
+    moves = "G91\nG1 X10 F600\n{}\nG1 X-10\n"
+    with_dwell, without = tmp_path / f"a{ending}", tmp_path / f"b{ending}"
+    with_dwell.write_text(moves.format(f"{dwell}\n{dwell}"))
+    without.write_text(moves.format(""))
+    found, plain = (pf.read_path(file, made("stewart")) for file in (with_dwell, without))
+    assert found.times is not None and plain.times is not None
+    assert plain.times[-1] == pytest.approx(2.0)
+    assert found.times[-1] == pytest.approx(2.0 + 2.0 * seconds)
+    sampled = pf.read_path(with_dwell, made("stewart"), rate=100.0)
+    assert sampled.times is not None
+    still = (sampled.times >= 1.0) & (sampled.times <= 1.0 + 2.0 * seconds)
+    x = sampled.targets[:, 0, 3]
+    np.testing.assert_allclose(x[still], x.max(), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(x[sampled.times > 1.0 + 2.0 * seconds + 1e-9][0], x.max(), atol=0.11)
+
+
 def test_words_of_a_printers_settings_are_no_places(tmp_path: Path) -> None:
-    settings = "M205 X8 Y8 ; jerk\nN5 M204 P500 R1000\nM900 K0.2\nM117 Layer G1 X9\nM84 X Y E\nG4 F5\n"
+    settings = "M205 X8 Y8 ; jerk\nN5 M204 P500 R1000\nM900 K0.2\nM117 Layer G1 X9\nM84 X Y E\nG4 P0\n"
     found = read(tmp_path, f"M201 X500 Y500\nG1 X10 F600\n{settings}G2 X5 Y5 R5\n{settings}", longest=1000.0)
     plain = read(tmp_path, "G1 X10 F600\nG2 X5 Y5 R5\n", longest=1000.0)
     np.testing.assert_array_equal(found.targets, plain.targets)

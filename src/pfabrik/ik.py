@@ -92,7 +92,9 @@ def solve_by(
     else:
         with telling(f"answering {counted(len(targets), 'target')}", on_progress) as tell:
             asked = mechanism, targets, begin, before, options, choose_engine
-            solutions = _answers(*asked) if executor is tell is None else _answers_by_blocks(executor, tell, *asked)
+            solutions = (
+                _answers(*asked) if executor is None and tell is None else _answers_by_blocks(executor, tell, *asked)
+            )
     status = solutions.rows.status
     refuse_invalid(targets, shape, status, options)
     is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()

@@ -67,7 +67,9 @@ def calibrate(
     DATA is a CSV file with a column for each actuator and for what was measured: x, y, z, roll, pitch, yaw, height,
     distance and distance_to, other joints. In place of actuators it may have what was commanded: x, y and height. Or it
     is what a probe wrote: lines of a log such as "probe at 30,40 is z=0.12", or RepRapFirmware's heightmap.csv. Several
-    files count together. Without DATA, MECH is Klipper's printer.cfg: what it has measured is in it. Of a printer's settings, actuators are what the firmware counts with them, and endstops, radius, angles and arms may
+    files count together. Without DATA, MECH is Klipper's printer.cfg: what it has measured is in it.
+
+    Of a printer's settings, actuators are what the firmware counts with them, and endstops, radius, angles and arms may
     vary. What the measurements do not determine stays as described, also in the files that are written.
     """
     if is_list:

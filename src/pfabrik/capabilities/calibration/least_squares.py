@@ -193,8 +193,8 @@ class _Problem:
         if self.priors:
             every = np.concatenate([every, self._prior_slopes()])
             left = np.concatenate([residual, (values[self.places] - self.prior_values) / self.prior_sigmas])
-            numbers = [np.concatenate([each, np.full(len(self.places), -1)]) for each in (groups, kinds)]
-            fitted = LinearFit(every * self.free, left, *numbers, has_sigma, least)
+            groups, kinds = (np.concatenate([each, np.full(len(self.places), -1)]) for each in (groups, kinds))
+            fitted = LinearFit(every * self.free, left, groups, kinds, has_sigma, least)
         before = self.factors * residuals(self.before)
         by_quantity = {block.quantity: block.residual for block in blocks}
         given = self.own, self.fit.measurements, values, self.priors

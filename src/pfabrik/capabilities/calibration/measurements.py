@@ -243,12 +243,13 @@ class Measurements:
         if self._names or other._names:
             own, others = self.names, other._names or other._numbered(self.rows)
             names = [*own[: self.rows], *others[: other.rows], *own[self.rows :], *others[other.rows :]]
-        sensors = dict.fromkeys([*self.joints, *other.joints])
+        sensors: dict[str, Any] = dict.fromkeys([*self.joints, *other.joints])
+        sensors = {name: _stacked([each.joints.get(name) for each in both], both) for name in sensors}
         return Measurements(
             np.concatenate([each.actuators for each in both]),
             **{name: _stacked([getattr(each, name) for each in both], both) for name in QUANTITIES[:3]},
             distances=np.concatenate([self.distances, pairs]) if len(self.distances) + len(pairs) else None,
-            joints={name: _stacked([each.joints.get(name) for each in both], both) for name in sensors},
+            joints=sensors,
             sigma=_common_sigma(self, other),
             absolute_sigma=self.has_deviations,
             names=names,

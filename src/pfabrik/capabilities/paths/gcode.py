@@ -204,8 +204,9 @@ def steps_of(
         words = _words(text, number, state.passed)
         state.is_printers |= "E" in words
         _obey(state, words, number)
-        if is_dwell(words):
-            yield Move(state.place.copy(), math.nan, number, _dwell(words, state.is_printers, number))
+        dwell = _dwell(words, state.is_printers, number) if is_dwell(words) else 0.0
+        if dwell > 0.0:
+            yield Move(state.place.copy(), math.nan, number, dwell)
         moves = any(letter in words for letter in AXES)
         if state.motion is None and moves:
             raise WrongText(f"line {number}: a position without G0, G1, G2 or G3")

@@ -94,6 +94,7 @@ def joined(blocks: Iterable[Path]) -> Path:
     parts = list(blocks)
     first = parts[0]
     times = None if first.times is None else np.concatenate([each.times for each in parts if each.times is not None])
+    dwells = [each.dwells for each in parts if each.dwells is not None]
     return first._replace(
         targets=np.concatenate([each.targets for each in parts]),
         times=times,
@@ -101,7 +102,5 @@ def joined(blocks: Iterable[Path]) -> Path:
         lines=[line for each in parts for line in each.lines],
         others={name: [cell for each in parts for cell in each.others[name]] for name in first.others},
         passed=parts[-1].passed,
-        dwells=None
-        if first.dwells is None
-        else np.concatenate([each.dwells for each in parts if each.dwells is not None]),
+        dwells=np.concatenate(dwells) if dwells else None,
     )
