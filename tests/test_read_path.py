@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import pfabrik as pf
 from machines import machine as made
 from pfabrik.capabilities.paths import path as path_module
+from pfabrik.cli import main
 from pfabrik.common.cells import marked
 from pfabrik.errors import InvalidArgument
 
@@ -380,3 +382,51 @@ def test_what_slicers_write_passes_and_is_named(tmp_path: Path) -> None:
         "PAUSE": 20,
         "END_PRINT": 21,
     }
+
+
+def test_a_recording_with_columns_and_units_of_its_own(tmp_path: Path) -> None:
+    """A game's log, in m and ms, is the table that it would be in the machine's units and under its names."""
+    rows = np.random.default_rng(5).uniform(-0.01, 0.01, (20, 4))
+    log, table = tmp_path / "log.csv", tmp_path / "table.csv"
+    lines = ["time;surge [m];sway;heave;roll;x;gear"]
+    plain = ["t,x,y,z,roll_rad"]
+    for k, (x, y, z, roll) in enumerate(rows):
+        lines.append(f"{20 * k};{x:.9f};{y:.9f};{z + 0.195:.9f};{roll:.9f};{k};N")
+        plain.append(f"{0.02 * k},{1000 * x:.6f},{1000 * y:.6f},{1000 * z + 195:.6f},{roll:.9f}")
+    log.write_text("\n".join(lines))
+    table.write_text("\n".join(plain))
+    machine = made("stewart")
+    columns = {"t": "time", "x": "surge [m]", "y": "sway", "z": "heave", "roll_rad": "roll"}
+    scale = {"t": 1e-3, "x": 1e3, "y": 1e3, "z": 1e3}
+    found, right = pf.read_path(log, machine, columns=columns, scale=scale), pf.read_path(table, machine)
+    np.testing.assert_allclose(found.targets, right.targets, atol=1e-5)
+    np.testing.assert_allclose(found.times, right.times, atol=1e-12)
+    assert found.others["gear"][0] == "N" and found.others["file_x"][3] == "3"
+    by_one = pf.read_path(log, machine, columns={k: v for k, v in columns.items() if k != "t"}, scale=1000.0, rate=None)
+    np.testing.assert_array_equal(by_one.targets, found.targets)
+    words = "t=time,x=surge [m],y=sway", "z=heave,roll_rad=roll"
+    options = [*(part for each in words for part in ("--columns", each)), "--scale", "1000", "--scale", "t=0.001"]
+    for command, more in (("track", []), ("time", ["--speed", "500"]), ("effort", ["--load", "platform=2,0,0,0"])):
+        files = []
+        for path, own in ((log, options), (table, [])):
+            files.append(tmp_path / f"{path.stem}.{command}")
+            line = [command, "stewart", str(path), *own, *more, "-o", str(files[-1]), "--rate", "200"]
+            result = CliRunner().invoke(main, line)
+            assert result.exit_code == 0, result.output
+        ours, theirs = ([float(row.split(",")[0]) for row in f.read_text().splitlines()[1:]] for f in files)
+        np.testing.assert_allclose(ours, theirs, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("columns", "scale", "words"),
+    [
+        ({"x": "surge"}, None, "no column 'surge'; expected one of those there: t, x, y, z"),
+        ({"x": 3}, None, r"columns\['x'\]"),
+        (None, -1.0, "scale"),
+        (None, {"x": 0.0}, "scale of 'x'"),
+    ],
+)
+def test_columns_that_are_not_there(columns: Any, scale: Any, words: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t,x,y,z\n0,0,0,195\n1,1,0,195\n")
+    with pytest.raises(InvalidArgument, match=words):
+        pf.read_path(tmp_path / "a.csv", made("stewart"), columns=columns, scale=scale)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BufferedReader
 from itertools import chain, islice, repeat
@@ -21,7 +21,7 @@ from ...common.rotations import to_rpy
 from ...common.text_lines import WrongText, as_text, lines_of, refusing
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.poses import pose
-from .csv_table import CsvTable
+from .csv_table import CsvTable, named_columns
 from .gcode import COMMENT, Move, steps_of
 from .path import BLOCK, MOST_STEPS, Path, joined
 from .sampling import at_rate, divided, timed
@@ -45,6 +45,8 @@ def read_path(
     longest: float | None = None,
     rate: float | None = None,
     rapid: float | None = None,
+    columns: Mapping[str, str] | None = None,
+    scale: float | Mapping[str, float] | None = None,
 ) -> Path:
     """A path for a mechanism from a CSV file, or from G-code.
 
@@ -72,6 +74,10 @@ def read_path(
         Steps per second instead, between the targets straight on [1/s].
     rapid : float, optional
         Feed of rapid moves [length/s], which say none.
+    columns : mapping of str to str, optional
+        What a table calls its columns: ``{"t": "time", "x": "surge [m]", "roll_rad": "roll"}``, of a recording say.
+    scale : float or mapping of str to float, optional
+        Factor on a table's lengths, x, y, z and feed (1000 from m to mm), or on columns by name: ``{"t": 1e-3}``.
 
     Raises
     ------
@@ -79,7 +85,10 @@ def read_path(
         A file that is no path, with its line; one of more than a million targets; a rate for a path that says nothing
         of time.
     """
-    path_read = joined(path_blocks(path, mechanism, tolerance=tolerance, longest=longest, rate=rate, rapid=rapid))
+    blocks = path_blocks(
+        path, mechanism, tolerance=tolerance, longest=longest, rate=rate, rapid=rapid, columns=columns, scale=scale
+    )
+    path_read = joined(blocks)
     if path_read.times is not None and not np.isfinite(path_read.times).all():
         return path_read._replace(times=None)
     return path_read
@@ -93,6 +102,8 @@ def path_blocks(
     longest: float | None = None,
     rate: float | None = None,
     rapid: float | None = None,
+    columns: Mapping[str, str] | None = None,
+    scale: float | Mapping[str, float] | None = None,
     sample_time: float | None = None,
     most: int | None = None,
 ) -> Iterator[Path]:
@@ -110,12 +121,15 @@ def path_blocks(
     for option, value in lengths_and_times.items():
         if value is not None:
             require_positive(option, value)
+    as_named = named_columns(columns or {}, scale)
     file = require_path("path", path)
     name = "standard input" if str(file) == "-" else str(file)
     with refusing(name, "CSV or G-code that can be followed"), _opened(file) as handle:
         is_table, lines = _begun(lines_of(handle, 10 * most, "a path"), file.suffix.lower())
+        if not is_table and (as_named.columns or as_named.scales):
+            raise WrongText("G-code; expected a table, of which columns and scale are")
         if is_table:
-            table = CsvTable(lines, mechanism)
+            table = CsvTable(lines, mechanism, as_named)
             blocks, has_times = _counted(table.blocks(), most), table.has_times
             if longest is not None:
                 blocks = divided(blocks, longest)
