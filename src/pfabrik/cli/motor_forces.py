@@ -68,7 +68,7 @@ def effort(
         if limits:
             track = pf.track(mechanism, read.targets)
             motion: pf.Timed | pf.Track = pf.time_path(
-                track, **limits, loads=loads, gravity=gravity, rate=rate or 1000.0
+                track, **limits, loads=loads, gravity=gravity, rate=rate or 1000.0, dwells=read.dwells
             )
         else:
             motion = at_its_times(mechanism, read, sample_time)

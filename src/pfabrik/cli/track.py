@@ -361,7 +361,8 @@ def time(
         note(f"max_torque of the file has no effect: no `mass` of {', '.join(left)} in tables [[body]]")
     read = pf.read_path(path, mechanism, **reading)
     with nullcontext() if output is None else whole_file(output) as handle, at_lines_of(read):
-        timed = pf.time_path(pf.track(mechanism, read.targets), **limits, loads=loads, gravity=gravity, rate=rate)
+        followed = pf.track(mechanism, read.targets)
+        timed = pf.time_path(followed, **limits, loads=loads, gravity=gravity, rate=rate, dwells=read.dwells)
         if handle is not None:
             timed.write(handle)
     print_result(as_json, timed, to_stderr=output == STANDARD)
