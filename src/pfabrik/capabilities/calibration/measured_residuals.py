@@ -40,6 +40,10 @@ class Residuals(NamedTuple):
     groups: Ints
 
 
+HAIR = 1e-6
+"""How far actuators may be from their readings [L or rad]: a tenth of what instruments show at best."""
+
+
 class Fit:
     """Measurements beside what a machine would give by the values of its parameters.
 
@@ -76,7 +80,7 @@ class Fit:
         if not solution and start is None and self._start is not None:  # measured in another frame, or too far off
             self._start = self._last = None
             solution = self._assembled(self.parameters.values)[1]
-        is_apart = np.ravel(solution.status) != Status.REACHED
+        is_apart = _is_apart(solution)
         if not is_apart.any():
             self._start = copy(solution._configurations)
         self._stretched = np.ravel(solution.status) == Status.PROJECTED
@@ -85,7 +89,7 @@ class Fit:
 
     def require_assembled(self, values: Floats) -> None:
         """InvalidArgument for readings at which the machine with these values cannot be assembled."""
-        is_apart = np.ravel(self._assembled(values)[1].status) != Status.REACHED
+        is_apart = _is_apart(self._assembled(values)[1])
         if is_apart.any():
             raise self._not_assembled(is_apart, "calibrated")
 
@@ -147,7 +151,7 @@ class Fit:
             described = self.blocks(self.parameters.values)
             return [block._replace(residual=np.full_like(block.residual, np.nan)) for block in described]
         status = np.ravel(solution.status)
-        is_apart = status != Status.REACHED
+        is_apart = _is_apart(solution)
         poses = np.array(solution.pose)
         poses[is_apart & ~(self._stretched & (status == Status.PROJECTED))] = np.nan
         q = np.array(solution.q) if slopes or self._columns else np.zeros((len(poses), 0))
@@ -229,6 +233,12 @@ class Fit:
             kept = np.isfinite(given.joints[name])
             slopes = None if rates is None else rates[kept, column]
             yield Residuals("joints", q[kept, column] - given.joints[name][kept], slopes, rows[kept])
+
+
+def _is_apart(solution: Solution) -> Mask:
+    """Rows (n,) at which the machine is not assembled: a search may end a hair from readings that it can have."""
+    status, off = np.ravel(solution.status), np.ravel(solution.actuator_error)
+    return np.asarray((status > Status.PROJECTED) | ((status == Status.PROJECTED) & (off > HAIR)))
 
 
 def _sensor_columns(machine: Mechanism, measurements: Measurements) -> Mapping[str, int]:

@@ -45,7 +45,8 @@ class Parameters:
     units : tuple of str
         The mechanism's unit of length, "rad", or "" for a dimension, which is as its file has it.
     scales : array (p,)
-        Changes that would be noticed: L, 1 rad, or of a dimension what moves a joint by L or turns an axis by 1 rad.
+        Changes that would be noticed: L, 1 rad, or of a dimension what moves a joint by L or turns an axis by 1 rad,
+        or its size if that is more.
     moves : array (p, 2, 6)
         Derivatives of the instrument's frame and target, a rotation vector and a place each.
     factors : array (p, n_a)
@@ -147,7 +148,7 @@ class Parameters:
         return Geometry(*((a[:p] - a[p:]) / (2.0 * steps).reshape(p, *(1,) * (a.ndim - 1)) for a in both))
 
     def _dimension_scales(self) -> Floats:
-        """Changes of the dimensions that move some joint by L, or turn an axis by 1 rad; else their own size, or 1."""
+        """Changes of the dimensions that move some joint by L or turn an axis by 1 rad; or their own size, if more."""
         n, length = len(self._dimensions), self.mechanism.characteristic_length
         if not n:
             return np.zeros(0)
@@ -156,8 +157,10 @@ class Parameters:
         moved = [points, length * axes.reshape(n, -1, 3), reference_point[:, None]]
         sizes = [np.linalg.norm(np.nan_to_num(each), axis=2).max(axis=1, initial=0.0) for each in moved]
         effects = np.max([*sizes, np.abs(home * np.where(is_angle, length, 1.0)).max(axis=1, initial=0.0)], axis=0)
-        own = np.where(self.values[:n] == 0.0, 1.0, np.abs(self.values[:n]))
-        return np.asarray(np.divide(length, effects, out=own, where=(effects > 0.0) & np.isfinite(effects)))
+        own = np.abs(self.values[:n])
+        least = np.divide(length, effects, out=np.zeros(n), where=(effects > 0.0) & np.isfinite(effects))
+        scales = np.maximum(own, least)
+        return np.where(scales > 0.0, scales, 1.0)
 
     def _geometries(self, values: Floats) -> Geometry:
         """Geometries at values (b, p), every array with the batch in front."""
