@@ -5,7 +5,8 @@ python benchmarks/controllers.py [--targets 60] [--docs] [NAME ...]
 Bytes and stack are those of arm-none-eabi-gcc -Os for a Cortex-M4F in single precision; instructions those that
 qemu-system-arm counts, there and on a Cortex-M7 in double precision. Without these programs it says so, and compares
 what the C compiler here makes of the file with integers of 32 bits. It ends with 1 where a status differs, a pose is
-farther from its target than the library's by more than the tolerance, or no target was searched for. With --docs it
+farther from its target than the library's by more than the tolerance, no target was searched for, or ticks along the
+targets as a stream do not end where the library's do. With --docs it
 writes the table of docs/your-controller.md. On Debian:
 apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm
 """
@@ -38,7 +39,19 @@ STEPS = 200
 TOLERANCE: dict[Precision, float] = {"double": 1e-8, "float": 1e-4}
 """How much farther from its target than the library's a nearest pose may be [L]."""
 
-PARTS = {"IK": ("ik", "limits"), "+ FK": ("ik", "limits", "fk"), "+ nearest": ("ik", "limits", "fk", "nearest")}
+PARTS = {
+    "IK": ("ik", "limits"),
+    "IK, live": ("ik", "limits", "live"),
+    "IK, FK": ("ik", "limits", "fk"),
+    "IK, FK, nearest": ("ik", "limits", "fk", "nearest"),
+}
+ALL = "ik", "limits", "fk", "nearest", "live"
+
+SPEED, TICKS = 0.02, 10
+"""Of a stream: how far drives go in a tick [L or rad], and its ticks for each target."""
+
+APART: dict[Precision, float] = {"double": 1e-6, "float": 1e-2}
+"""Most difference of drives from the library's at the end of the stream [L or rad]."""
 
 GCC, QEMU = "arm-none-eabi-gcc", "qemu-system-arm"
 M4F = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
@@ -65,12 +78,21 @@ static const double targets[][12] = {
 int main(void)
 {
     unsigned k, i, j, counts[3];
-    pfk_real a[PFK_ACTUATORS];
-    static pfk_memory memory;
+    pfk_real a[PFK_ACTUATORS], driven[PFK_ACTUATORS];
+    static const pfk_real speeds[PFK_ACTUATORS] = {SPEEDS}, no_accelerations[PFK_ACTUATORS];
+    static pfk_memory memory, live;
     pfk_begin(&memory);
+    pfk_begin(&live);
+    {
+        pfk_pose home;
+        pfk_home(&home);
+        if (pfk_live_begin(&live, &home, speeds, no_accelerations, driven))
+            return 1;
+    }
     for (k = 0; k < sizeof targets / sizeof *targets; ++k) {
         pfk_pose target, pose, back;
-        int code, near = 0, fk = 0, steps = 0;
+        int code, near = 0, fk = 0, steps = 0, tick;
+        unsigned longest = 0;
         pfk_home(&pose);
         pfk_home(&back);
         for (i = 0; i < 3; ++i)
@@ -91,8 +113,18 @@ int main(void)
             near = pfk_nearest(&memory, &target, &pose, a, STEPS, STARTS, 0);
             counts[2] = counted();
         }
-        printf("%d %d %d %u %u %u %d %d", code, fk, near, counts[0], counts[1], counts[2], steps,
-               near ? memory.told.steps : 0);
+        for (tick = 0; tick < TICKS_EACH; ++tick) {
+            pfk_pose there;
+            unsigned count;
+            start();
+            pfk_live_tick(&live, &target, 1, &there, driven);
+            count = counted();
+            longest = count > longest ? count : longest;
+        }
+        printf("%d %d %d %u %u %u %d %d %u", code, fk, near, counts[0], counts[1], counts[2], steps,
+               near ? memory.told.steps : 0, longest);
+        for (i = 0; i < PFK_ACTUATORS; ++i)
+            printf(" %.9g", (double)driven[i]);
         for (i = 0; i < 3; ++i)
             printf(" %.9g %.9g %.9g %.9g", (double)pose.R[i][0], (double)pose.R[i][1], (double)pose.R[i][2],
                    (double)pose.p[i]);
@@ -213,11 +245,20 @@ def told(
     machine: pf.Mechanism, known: Truth, precision: Precision, folder: Path, *, on_board: bool, starts: int
 ) -> Array:
     """What the exported file says of the targets, one row each: codes, counts, the pose."""
-    (folder / "exported.c").write_text(c_source(machine, precision=precision, parts=PARTS["+ nearest"]))
+    (folder / "exported.c").write_text(c_source(machine, precision=precision, parts=ALL))
     flat = np.concatenate([known.targets[:, :3, 3], known.targets[:, :3, :3].reshape(-1, 9)], axis=1)
     (folder / "targets.h").write_text("".join("{" + ", ".join(map(repr, row)) + "},\n" for row in flat.tolist()))
     (folder / "main.c").write_text(MAIN)
-    given = ['-DEXPORTED="exported.c"', '-DTARGETS="targets.h"', f"-DSTEPS={STEPS}", f"-DSTARTS={starts}", "main.c"]
+    speeds = ",".join(repr(float(each)) for each in SPEED * units_of(machine))
+    defined = [f"-DSPEEDS={speeds}", f"-DTICKS_EACH={TICKS}"]
+    given = [
+        *defined,
+        '-DEXPORTED="exported.c"',
+        '-DTARGETS="targets.h"',
+        f"-DSTEPS={STEPS}",
+        f"-DSTARTS={starts}",
+        "main.c",
+    ]
     if not on_board:
         compiler = next(name for name in ("cc", "gcc", "clang") if shutil.which(name))
         given = ["-DPFK_INTEGER=int32_t", *given]
@@ -234,10 +275,24 @@ def told(
     return np.array([line.split() for line in run.stdout.splitlines()], float)
 
 
+def units_of(machine: pf.Mechanism) -> Array:
+    """1 rad or L of every drive."""
+    return np.array([machine.characteristic_length if drive.kind == "length" else 1.0 for drive in machine.drives])
+
+
+def driven(machine: pf.Mechanism, known: Truth) -> Array:
+    """Where the library's ticks along the stream of all targets end."""
+    live = pf.Live(machine, speed=dict(zip(machine.actuator_names, SPEED * units_of(machine), strict=True)))
+    for target in known.targets:
+        for _ in range(TICKS):
+            live.tick(target, 1.0)
+    return np.array(live.actuators)
+
+
 def compared(machine: pf.Mechanism, known: Truth, said: Array) -> tuple[int, int, float]:
     """How many statuses differ from the library's, and how many nearest poses were found; how much farther [L]."""
     status = np.where(said[:, 0] == 0, 0, np.where(said[:, 2] == 0, 0, np.where(said[:, 2] == -4, 1, 9)))
-    poses = said[:, 8:].reshape(-1, 3, 4)
+    poses = said[:, -12:].reshape(-1, 3, 4)
     distance = [np.linalg.norm(each[:, :3, 3] - known.targets[:, :3, 3], axis=1) for each in (poses, known.poses)]
     both = (status == 1) & (known.status == 1)
     above = (distance[0] - distance[1])[both] / machine.characteristic_length
@@ -265,6 +320,7 @@ def main() -> int:
     for name in given.names:
         machine = pf.load(name)
         known = truth_of(machine, given.targets)
+        ends = driven(machine, known)
         print(f"\n{name}: {np.count_nonzero(known.status == 0)} of {len(known.status)} targets reached")
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place)
@@ -272,25 +328,27 @@ def main() -> int:
                 size = size_of(c_source(machine, precision="float", parts=parts), folder)
                 rows.append([name, part, *(f"{bytes / 1000:.1f} kB" for bytes in size)])
                 print(
-                    f"  M4F float {part:<10} code {size.code:6,}  constants {size.constants:6,}  RAM {size.memory:6,}"
+                    f"  M4F float {part:<16} code {size.code:6,}  constants {size.constants:6,}  RAM {size.memory:6,}"
                     f"  stack {size.stack:6,}"
                 )
             for precision in ("float", "double"):
                 said = told(machine, known, precision, folder, on_board=has_gcc and has_qemu, starts=given.starts)
                 differ, n_nearest, above = compared(machine, known, said)
-                is_wrong |= differ > 0 or n_nearest == 0 or above > TOLERANCE[precision]
+                apart = float(np.abs((said[-1, 9:-12] - ends) / units_of(machine)).max())
+                is_wrong |= differ > 0 or n_nearest == 0 or above > TOLERANCE[precision] or apart > APART[precision]
                 if precision == "float" and rows:
-                    rows[-3] += [counts(said, 3), "", ""]
-                    rows[-2] += [counts(said, 3), counts(said, 4), ""]
-                    rows[-1] += [counts(said, column) for column in (3, 4, 5)]
-                    rows[-2] += [f"{said[:, 6].max():.0f}", ""]
-                    rows[-1] += [f"{said[:, column].max():.0f}" for column in (6, 7)]
-                    rows[-3] += ["", ""]
-                of = f"IK {counts(said, 3)}, FK {counts(said, 4)}, nearest {counts(said, 5)}"
+                    for row, parts in zip(rows[-len(PARTS) :], PARTS.values(), strict=True):
+                        asked = {"ik": 3, "fk": 4, "nearest": 5, "live": 8}
+                        row += [counts(said, column) if part in parts else "" for part, column in asked.items()]
+                        most = {"fk": 6, "nearest": 7}
+                        row += [
+                            f"{said[:, column].max():.0f}" if part in parts else "" for part, column in most.items()
+                        ]
+                of = f"IK {counts(said, 3)}, FK {counts(said, 4)}, nearest {counts(said, 5)}, tick {counts(said, 8)}"
                 most = f"most steps FK {said[:, 6].max():.0f}, nearest {said[:, 7].max():.0f}"
                 print(
                     f"  {precision:<6} statuses that differ {differ}, nearest {n_nearest}, farther by {above:.1e} L;"
-                    f" instructions {of}; {most}"
+                    f" drives apart after {TICKS * len(said)} ticks {apart:.1e}; instructions {of}; {most}"
                 )
     if given.docs and has_gcc and has_qemu:
         write_table(rows)
@@ -300,8 +358,8 @@ def main() -> int:
 def write_table(rows: list[list[str]]) -> None:
     """Put the table into its page."""
     columns = ["machine", "parts", "code", "constants", "memory", "stack", "`_ik`", "`_fk`", "`_nearest`"]
-    columns += ["steps of `_fk`", "of `_nearest`"]
-    lines = [f"| {' | '.join(row)} |" for row in (columns, ["---"] * 2 + ["--:"] * 9, *rows)]
+    columns += ["`_live_tick`", "steps of `_fk`", "of `_nearest`"]
+    lines = [f"| {' | '.join(row)} |" for row in (columns, ["---"] * 2 + ["--:"] * 10, *rows)]
     text = PAGE.read_text(encoding="utf-8")
     first, last = text.index(BEGIN) + len(BEGIN), text.index(END)
     PAGE.write_text("".join([text[:first], "\n", "\n".join(lines), "\n", text[last:]]), encoding="utf-8")

@@ -113,6 +113,32 @@ class Hexapod:
             self.lengths.set_joint(f"to_platform_{i}__", off)
         return self._search()
 
+    def follow(self, targets: Array, speed: float) -> Array:
+        """Where it is after each tick of a second towards targets (n, 4, 4), struts no faster than a speed [length]."""
+        for i in range(len(self.feet)):
+            self.robot.set_velocity_limit(f"to_platform_{i}__", speed / self.length)
+        self.solver.dt = 1.0
+        self.solver.enable_velocity_limits(True)
+        state = self.robot.state
+        state.q = self.begin
+        self.robot.state = state
+        self.robot.update_kinematics()
+        poses = np.empty((len(targets), 4, 4))
+        for pose, target in zip(poses, targets, strict=True):
+            scaled = self.scaled(target)
+            self.position.target_world, self.orientation.R_world_frame = scaled[:3, 3], scaled[:3, :3]
+            self.solver.solve(True)
+            self.robot.update_kinematics()
+            pose[:] = self.robot.get_T_world_frame("platform")
+        self.opened = self.gap()
+        poses[:, :3, 3] *= self.length
+        return poses
+
+    def gap(self) -> float:
+        """How far its struts end from the feet at most [L]."""
+        ends = [self.robot.get_T_world_frame(f"platform_{i}__")[:3, 3] for i in range(len(self.feet))]
+        return float(np.linalg.norm(np.array(ends) - self.feet, axis=1).max())
+
     def _search(self) -> Array:
         state = self.robot.state
         state.q = before = self.begin
@@ -149,6 +175,39 @@ def peer(rng: np.random.Generator, runs: int) -> Iterator[Row]:
         yield row(f"6-UPS, one solve_ik, {what}", asked, ours, Hexapod(mechanism, held).ik, runs)
     values, theirs = pf.solve_ik(mechanism, near).actuators, Hexapod(mechanism, driven=True)
     yield row("6-UPS, one solve_fk", values, partial(pf.solve_fk, mechanism), theirs.fk, runs)
+    yield from followed(mechanism, runs)
+
+
+def followed(mechanism: pf.Mechanism, runs: int) -> Iterator[Row]:
+    """A tick each along a stream that leaves reach by far and comes back; how far both are from it in the mean."""
+    n, length = 600, mechanism.characteristic_length
+    turn = np.arange(n) / n * 2.0 * np.pi
+    shift = 0.9 * np.stack([np.sin(turn), np.sin(2 * turn + 0.4), np.sin(3 * turn + 1.0)], axis=1)
+    turned = 0.7 * np.stack([np.sin(2 * turn), np.sin(turn + 0.7), np.sin(3 * turn)], axis=1)
+    targets = pf.pose(mechanism.home_pose[:3, 3] + length * shift, rotvec=turned)
+    theirs, speed = Hexapod(mechanism), 0.02 * length
+    live = pf.Live(mechanism, speed=speed, hold=None, rotation_length=length)
+
+    def ticks() -> Array:
+        live.reset()
+        return np.array([(live.tick(target, 1.0), live.pose.copy())[1] for target in targets])
+
+    own, peers = best_times(min(runs, 5), ticks, lambda: theirs.follow(targets, speed))
+    for poses, whose, gap in ((ticks(), "Live", 0.0), (theirs.follow(targets, speed), "PlaCo", theirs.opened)):
+        errors = mechanism_errors(mechanism, poses, targets)
+        margins = np.asarray(pf.feasibility(mechanism, poses).margin)
+        print(
+            f"6-UPS, {whose} along a stream: {errors.mean():.3f} L from it in the mean, within all limits in"
+            f" {np.mean(margins >= -1e-6):.0%} of {n} ticks, loops open by {gap:.1e} L in the end"
+        )
+    yield Row("6-UPS, Live.tick, out of reach and back", n, own / n, "PlaCo", peers / n)
+
+
+def mechanism_errors(mechanism: pf.Mechanism, poses: Array, targets: Array) -> Array:
+    """Distances of poses from targets (n,) [L]; a radian counts as much as L."""
+    positions = np.linalg.norm(poses[:, :3, 3] - targets[:, :3, 3], axis=1) / mechanism.characteristic_length
+    traces = np.einsum("nij,nij->n", poses[:, :3, :3], targets[:, :3, :3])
+    return np.asarray(np.hypot(positions, np.arccos(np.clip(0.5 * (traces - 1.0), -1.0, 1.0))))
 
 
 def row(what: str, asked: Array, ours: Callable[[Array], object], theirs: Callable[[Array], object], runs: int) -> Row:

@@ -2,7 +2,7 @@
 const fs = require("fs");
 
 const scripts = process.argv.slice(2).map((path) => fs.readFileSync(path, "utf-8"));
-const { kernels, machine, targets, path, values, link, edges, listed, spoiled } = JSON.parse(fs.readFileSync(0, "utf-8"));
+const { kernels, machine, targets, path, values, link, edges, listed, spoiled, stream, speeds } = JSON.parse(fs.readFileSync(0, "utf-8"));
 
 const names = "{ Engine, Scene, Session, singularityOf }";
 const { Engine, Scene, Session, singularityOf } = new Function(`${scripts.join("\n")}; return ${names};`)();
@@ -40,7 +40,9 @@ async function main() {
   const undone = [...session.answer.pose];
   session.redo();
   const numbers = spoiled.map((matrix) => matrix.map((number) => number ?? NaN)); // which JSON does not have
+  if (stream.length) engine.rest(home);
   const answers = {
+    ticks: stream.map((target) => engine.tick(target, 0.01, speeds)),
     spoiled: [null, home].map((from) => numbers.map((matrix) => engine.ask(matrix, from).status)),
     inverse: targets.map((target) => plain(engine.ask(target))),
     followed: followed.map(plain),

@@ -28,6 +28,7 @@ from pfabrik.errors import InvalidArgument
 from pfabrik.machine.model import model_of
 from pfabrik.view.page.export_web import FOLDER, SCRIPTS, web_page
 from pfabrik.view.page.page_data import page_data
+from test_streams import smooth
 
 NODE = shutil.which("node")
 needs_node = pytest.mark.skipif(NODE is None, reason="needs Node.js, which is not installed")
@@ -48,7 +49,7 @@ AT_EDGE = 1e-4
 tolerance of a pose."""
 
 NO_ICON = '<link rel="icon" href="data:,">'
-LARGEST = 240_000
+LARGEST = 260_000
 """Of a page [bytes]."""
 
 
@@ -143,7 +144,7 @@ def ask(name: str, targets: Any, **more: Any) -> dict[str, Any]:
         "targets": targets.reshape(-1, 16).tolist(),
         "listed": targets_of(loaded(name), 1, 5).ravel().tolist(),
         "link": link_to(loaded(name).home_pose),
-        **{what: [] for what in ("path", "values", "edges", "spoiled")},
+        **{what: [] for what in ("path", "values", "edges", "spoiled", "stream")},
         **more,
     }
     scripts = [str(FOLDER / "web" / f"{each}.js") for each in SCRIPTS[: SCRIPTS.index("session") + 1]]
@@ -244,6 +245,26 @@ def test_at_the_edge_of_reach_a_page_travels_as_the_library_does(name: str) -> N
             assert found == pytest.approx(distance, rel=1e-6, abs=AT_EDGE * length)
         serial = pf.singularity(expected).serial
         assert answer["singular"]["serial"] == pytest.approx(serial, rel=NEAR_RATIO, abs=NEAR_RATIO)
+
+
+@needs_node
+@pytest.mark.parametrize("name", ["stewart", "delta", "rps", "ankle_rss", "nrpm"])
+def test_a_page_drives_a_machine_along_a_stream_as_live_does(name: str) -> None:
+    """In and out of reach, then at rest: statuses, drives, and at rest the limits that hold it."""
+    machine = loaded(name)
+    poses = smooth(machine, 300)
+    stream = np.concatenate([poses, np.repeat(poses[-1:], 500, axis=0)])
+    speeds = np.full(len(machine.drives), 0.5) * actuator_units(machine)
+    live = pf.Live(machine, speed=dict(zip(machine.actuator_names, speeds.tolist(), strict=True)))
+    track = live.follow(stream, sample_time=0.01)
+    told = ask(name, targets_of(machine, 0, 0), stream=stream.reshape(-1, 16).tolist(), speeds=speeds.tolist())["ticks"]
+    assert [answer["status"] for answer in told] == track.status.astype(int).tolist()
+    off = np.abs([answer["actuators"] for answer in told] - track.actuators) / actuator_units(machine)
+    assert off.max() <= NEAR_DRIVES
+    assert not told[-1]["isMoving"]
+    assert told[-1]["status"] == pf.Status.PROJECTED
+    held = {f"{limit['joint']} {limit['bound']}" for limit in told[-1]["limits"]}
+    assert held == {name for name in live.holding if "leg" not in name}
 
 
 @needs_node

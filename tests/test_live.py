@@ -276,6 +276,12 @@ def test_what_holds_a_tick_is_named() -> None:
         live.tick(up, 1.0)
     near = {f"{joint} {bound}" for (joint, bound), margin in pf.margins(live.solution).items() if margin < 1e-6}
     assert live.holding and set(live.holding) <= near
+    delta = machine("delta")  # whose legs are all in line there
+    apex, above = live_of(delta, 100), delta.home_pose.copy()
+    above[2, 3] += 0.9 * delta.characteristic_length
+    for _ in range(100):
+        apex.tick(above, 1.0)
+    assert apex.holding and all(word.endswith(" stretched") for word in apex.holding)
     assert live.tick(live.pose.copy(), 1.0) is Status.REACHED
     assert live.holding == () and live.lag < 1e-9 * hexapod.characteristic_length
 

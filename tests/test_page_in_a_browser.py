@@ -75,6 +75,40 @@ def test_the_platform_follows_the_mouse_and_what_stops_it_is_named(
 
 
 @BOTH
+def test_where_live_is_on_drives_go_no_faster_than_they_may_and_rest_in_the_end(
+    browser: Any, address: Callable[..., str], form: str
+) -> None:
+    machine = pf.load("stewart")
+    page, faults = opened(browser, address(machine, form), draws=True, **DESK)
+    page.locator("#pace button").click()
+    page.evaluate(
+        """() => {
+          const { session } = page, settle = session.settle.bind(session);
+          window.ticks = [];
+          session.settle = (state) => { settle(state); ticks.push([performance.now(), ...session.answer.actuators]); };
+        }"""
+    )
+    x, y = centre(page)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 250, y - 100)
+    page.mouse.up()
+    until(page, "ticks.length > 1 && !page.session.driver.clock")
+    assert page.locator("#status b").inner_text() == "Out of reach"
+    ticks = np.array(page.evaluate("ticks"))
+    waits, steps = np.diff(ticks[:, 0]) / 1000.0, np.abs(np.diff(ticks[:, 1:], axis=0)).max(axis=1)
+    assert steps.max() > 0.0
+    speed = page.evaluate("page.session.driver.speeds[0]")
+    assert steps.sum() <= speed * (waits.sum() + 1.0)
+    page.locator("#home").click()  # is driven to, like all else
+    until(page, "page.session.answer.status === 0 && !page.session.driver.clock")
+    assert page.evaluate("page.session.answer.actuators") == pytest.approx(
+        pf.solve_ik(machine, machine.home_pose).actuators
+    )
+    assert not faults
+
+
+@BOTH
 def test_a_link_opens_at_the_pose_that_it_was_copied_at(browser: Any, address: Callable[..., str], form: str) -> None:
     page, _ = opened(browser, address(pf.load("stewart"), form) + "#p=10,-20,200,5,0,10", **DESK)
     page.locator("canvas").press("ArrowRight")

@@ -27,14 +27,16 @@ from pfabrik.errors import InvalidArgument, UnsupportedMechanism
 from pfabrik.exchange.export.source import targets_around_home
 from pfabrik.machine.files.units import metres_of
 from test_export_clearance import hexapod
+from test_streams import smooth
 
 Array = np.ndarray
 DATA = Path(__file__).parent / "data"
 needs_compilers = pytest.mark.skipif(
     not (shutil.which("gcc") and shutil.which("g++")), reason="no compilers of C and C++ here: gcc, g++"
 )
-FAR = "open_loop=true", "largest_step=0"
-"""Parameters with which targets anywhere are commanded, from home on."""
+AT_ONCE = "out_of_reach=project"
+FAR = "open_loop=true", "largest_step=0", AT_ONCE
+"""Parameters with which targets anywhere are commanded at once, from home on."""
 
 SURE = *FAR, "steps=200", "starts=24"
 """And the search finds what the library does."""
@@ -245,6 +247,57 @@ def test_what_is_no_target_is_refused_and_out_of_reach_may_hold() -> None:
 
 
 @needs_compilers
+@pytest.mark.parametrize("name", MACHINES)
+def test_a_node_that_is_live_commands_what_live_does_at_each_tick(name: str) -> None:
+    """In reach and out of it; a target that is no pose stops it, one in another frame is as if it had not been."""
+    mechanism, metres = machine(name), metres_of(machine(name).length_unit)
+    units = np.where([drive.kind == "angle" for drive in mechanism.drives], 1.0, metres)
+    back = np.repeat(mechanism.home_pose[None], 60, axis=0)
+    targets, size = np.concatenate([smooth(mechanism, 120), back]), mechanism.characteristic_length
+    speeds = 0.4 * actuator_units(mechanism)
+    live = pf.Live(mechanism, speed=dict(zip(mechanism.actuator_names, speeds.tolist(), strict=True)))
+    lost, elsewhere = [f"{mechanism.base} nan 0 0 0 0 0 1"], [line_of(targets[-1], metres, "elsewhere")]
+    lines = [line_of(each, metres, mechanism.base) for each in targets] + elsewhere + lost
+    said = answers(name, lines, "open_loop=true", "rate=50", "speed=0.4")
+    statuses = []
+    for target, answer in zip([*targets, targets[-1]], said, strict=False):
+        statuses.append(live.tick(target, 0.02))
+        assert np.abs((np.array(answer["command"]) / units - live.actuators) / actuator_units(mechanism)).max() < 1e-7
+        off = matrix(answer["achieved"], metres) - live.pose
+        assert max(np.abs(off[:3, 3]).max() / size, np.abs(off[:3, :3]).max()) < 1e-7
+        if answer is said[-2]:
+            continue
+        assert answer["rig: target"]["message"].partition(":")[0] == statuses[-1].name
+        assert float(answer["rig: target"]["distance from target [m]"]) < 2.0 * live.lag * metres + 1e-9
+    assert {*statuses} == {pf.Status.REACHED, pf.Status.PROJECTED}
+    assert said[-2]["rig: target"]["REFUSED"] == "1"
+    assert said[-1]["command"] == said[-2]["command"] and said[-1]["rig: target"]["message"].startswith("REFUSED")
+    assert sum(int(said[-1]["rig: target"][each.name]) for each in {*statuses}) == len(targets)
+
+
+@needs_compilers
+def test_a_node_that_is_live_begins_where_the_machine_stands_and_waits_for_states_that_stop() -> None:
+    mechanism, metres = machine("stewart"), 1e-3
+    away, size = mechanism.home_pose.copy(), mechanism.characteristic_length
+    away[2, 3] += 0.1 * size
+    there = pf.solve_ik(mechanism, away).actuators * metres
+    states, line = "states " + " ".join(map(repr, there.tolist())), line_of(mechanism.home_pose, metres)
+    said = answers("stewart", [line, states, line, "wait 0.01", "wait 0.6", states, line], "speed=0.2")
+    assert "command" not in said[0] and said[0]["rig: target"]["message"].startswith("REFUSED: no position of")
+    step = 0.2 * size * metres * 0.01
+    for first in (said[2], said[6]):
+        assert 0.5 * step < np.abs(np.array(first["command"]) - there).max() <= step * (1.0 + 1e-9)
+    assert np.abs(np.array(said[3]["command"]) - there).max() <= 2.0 * step * (1.0 + 1e-9)
+    assert "command" not in said[4] and "command" not in said[5]
+    longest = 0.28 * np.ones(6)  # beyond its range by a hair, as measured
+    hair = "states " + " ".join(map(repr, (longest + 1e-7).tolist()))
+    (_, begun) = answers("stewart", [hair, line], "speed=0.2")
+    assert np.abs(np.array(begun["command"]) - longest).max() <= step * (1.0 + 1e-9)
+    (_, refused) = answers("stewart", [hair, line], "speed=0.2", "largest_step=1e-9")
+    assert "command" not in refused and "largest_step allows" in refused["rig: target"]["message"]
+
+
+@needs_compilers
 def test_actuators_may_be_measured_in_parts() -> None:
     """By several broadcasters on one topic: what one of them leaves out, or another machine's, is no fault."""
     mechanism = machine("stewart")
@@ -274,7 +327,7 @@ def test_a_node_begins_where_the_machine_stands_and_refuses_leaps_and_states_tha
     line = line_of(near, metres, mechanism.base)
     allowed = 1.01 * np.abs((there - here) / np.where(lengths, length * metres, 1.0)).max()
     guard, first = f"largest_step={allowed}", mechanism.actuator_names[0]
-    said = answers(name, [line, states, line, "wait 0.6", line, states, line], guard)
+    said = answers(name, [line, states, line, "wait 0.6", line, states, line], guard, AT_ONCE)
     assert said[0]["rig: target"]["message"] == f"REFUSED: no position of {first}"
     assert said[0]["rig: actuators"] == {"level": 2, "message": f"no position of {first}"}
     np.testing.assert_allclose(matrix(said[1]["tf"], metres), away, atol=1e-6 * length)  # it shows where that is
@@ -285,10 +338,10 @@ def test_a_node_begins_where_the_machine_stands_and_refuses_leaps_and_states_tha
     assert said[4]["rig: target"]["message"] == f"REFUSED: no position of {first} for 0.6 s"
     assert not {"command", "achieved"} & ({*said[0]} | {*said[4]})
     back = line_of(mechanism.home_pose, metres, mechanism.base)
-    _, leap = answers(name, [states, back], guard)
+    _, leap = answers(name, [states, back], guard, AT_ONCE)
     assert leap["rig: target"]["message"].startswith("REFUSED: a jump of an actuator: ") and "command" not in leap
     assert "; largest_step allows " in leap["rig: target"]["message"]
-    *_, kept = answers(name, [states, line, "wait 0.6", line], guard, "states_timeout=0")
+    *_, kept = answers(name, [states, line, "wait 0.6", line], guard, AT_ONCE, "states_timeout=0")
     assert kept["rig: target"]["message"] == "REACHED"
 
 
@@ -303,7 +356,7 @@ def test_a_package_is_complete_and_names_are_one(tmp_path: Path) -> None:
     parameters = yaml.safe_load(files["config/params.yaml"])["/**/my_delta"]["ros__parameters"]
     assert {name for name in parameters if f'"{name}"' in files["src/my_delta_node.cpp"]} == {*parameters}
     assert parameters["largest_step"] == 0.1 and parameters["states_timeout"] == 0.5
-    assert parameters["base_frame"] == "base" and parameters["out_of_reach"] == "project"
+    assert parameters["base_frame"] == "base" and parameters["out_of_reach"] == "live"
 
 
 def test_names_stand_in_a_package_as_they_are(tmp_path: Path) -> None:

@@ -89,7 +89,13 @@ print(f"{live.lag:.0f} mm from the target, at rest; held by {', '.join(sorted(li
 #
 # `pf.export_c(machine, "rig.c", parts=["ik", "limits", "live"], name="rig")`, or `pfabrik export stewart c -o rig.c
 # --parts ik,limits,live --name rig`, writes the same ticks in C: `rig_live_begin` and `rig_live_tick`, in memory of
-# yours. In double precision they are those of the library.
+# yours. In double precision they are those of the library. A ROS 2 node (`pfabrik export stewart --ros2-node rig_node`)
+# is live by default.
+#
+# ## By hand
+#
+# The page of a machine (`pfabrik export stewart --web stewart.html`, `pfabrik view stewart`) has a switch, *Live*, and a
+# slider of the speed beside it: drag the platform far away, and see how the machine follows and what holds it.
 #
 # ## What it costs
 #

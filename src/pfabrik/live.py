@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .answers.active_limits import stretched_joint
 from .answers.answer_fields import PoseRequest
 from .answers.pace import pace_of
 from .answers.solution import Solution
@@ -60,6 +61,8 @@ class Live:
         What is held out of reach, as in `Options`.
     hold_price : float
         Up to which, as in `Options`.
+    rotation_length : float, optional
+        Which distance a rotation counts as, per radian, as in `Options` [length].
     start : Solution or array (nq,), optional
         Where the machine is. Default: home.
 
@@ -87,10 +90,11 @@ class Live:
         acceleration: float | Mapping[str, float] | None = None,
         hold: Literal["orientation", "position"] | None = "orientation",
         hold_price: float = 10.0,
+        rotation_length: float | None = None,
         start: Start | None = None,
     ) -> None:
         self.mechanism = checked_mechanism(mechanism)
-        self.options = Options(hold=hold, hold_price=hold_price)
+        self.options = Options(hold=hold, hold_price=hold_price, rotation_length=rotation_length)
         speeds = drive_limits(mechanism, "speed", speed)
         self._limits = speeds, drive_limits(mechanism, "acceleration", acceleration)
         free = [name for name, most in zip(mechanism.actuator_names, speeds, strict=True) if most == math.inf]
@@ -231,6 +235,9 @@ class Live:
             return ()
         found = self._driven.multipliers()
         most = max(found.values(), default=0.0)
+        if not most > 0.0:  # where all links of a leg are in one line, its reach has no slope
+            stretched = stretched_joint(model_of(self.mechanism), self._driven.coordinates())
+            return tuple(f"{each.joint} {each.bound}" for each in stretched)
         return tuple(
             " ".join(limit) for limit, value in sorted(found.items(), key=lambda each: -each[1]) if value > 1e-6 * most
         )
@@ -249,6 +256,7 @@ class Live:
             acceleration=acceleration,
             hold=self.options.hold,
             hold_price=self.options.hold_price,
+            rotation_length=self.options.rotation_length,
             start=self.q,
         )
         return made, (self.mechanism,)

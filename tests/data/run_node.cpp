@@ -93,7 +93,7 @@ int main(int argc, char ** argv)
   for (int i = 1; i < argc; ++i) {
     const std::string text(argv[i]), name = text.substr(0, text.find('=')), value = text.substr(text.find('=') + 1);
     const bool is_integer = name == "steps" || name == "starts";
-    const bool is_number = name == "largest_step" || name == "show_rate" || name == "states_timeout";
+    const bool is_number = name != "command" && name != "show" && name != "out_of_reach" && name != "open_loop";
     world().parameters[name] = is_integer           ? std::any(std::int64_t{std::stoll(value)})
                                : is_number           ? std::any(std::stod(value))
                                : name == "open_loop" ? std::any(value == "true")

@@ -41,6 +41,8 @@ def exports() -> list[tuple[Any, tuple[Any, ...]]]:
     from pfabrik.kernels.pose.answer_rows import _TABLES as tables
     from pfabrik.kernels.pose.assemble_row import assemble_row
     from pfabrik.kernels.pose.evaluate import evaluate_poses
+    from pfabrik.kernels.pose.live_pose import _LIVE as live
+    from pfabrik.kernels.pose.live_pose import go_on, new_live_scratch, place
     from pfabrik.kernels.pose.search_records import new_solutions
     from pfabrik.kernels.pose.tables import QUESTION, Start, new_answer_scratch, new_weighing_scratch
 
@@ -53,6 +55,8 @@ def exports() -> list[tuple[Any, tuple[Any, ...]]]:
         (assemble_row, (*common, np.zeros((1, 1)), question, answer)),
         (weigh_limits, (*common[:2], new_weighing_scratch(tables), np.zeros((1, 4, 4)), answer, np.zeros(1))),
         (evaluate_poses, evaluate),
+        (place, (live, new_live_scratch(live))),
+        (go_on, (live, new_live_scratch(live), 0.0)),
     ]
 
 

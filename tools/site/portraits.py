@@ -1,4 +1,7 @@
-"""Write docs/pictures/live, machines as their pages show them: `python tools/site/portraits.py [NAME]...`; a film too.
+"""Write docs/pictures/live, machines as their pages show them, and a film: `python tools/site/portraits.py [NAME]...`.
+
+The film alone is called "film".
+
 
 Pages are opened in headless Chromium, light and dark, with nothing but the machine on them. The pictures have no
 ground, so that cards of any colour carry them.
@@ -24,10 +27,10 @@ from pfabrik.errors import InvalidArgument
 PICTURES = Path(__file__).resolve().parents[2] / "docs" / "pictures" / "live"
 SIZE = {"width": 720, "height": 600}  # pixels of a page
 WIDTH, ASPECT, MARGIN = 360, 6 / 5, 0.06  # of a picture: pixels, width by height, and the share left at each side
-FILM_SIZE = {"width": 560, "height": 480}
-QUALITY, FILM_QUALITY = 75, 50  # of WebP, of 100
-STEPS, DURATION = 45, 60  # of the film, and milliseconds of each
-RADIUS = 62.0  # of the film's circle about (0, 0, 232) [mm]: its upper third is out of reach
+FILM_SIZE = {"width": 400, "height": 420}
+FILM_WIDTH = 560  # pixels
+QUALITY, FILM_QUALITY = 75, 30  # of WebP, of 100
+STEPS, DURATION = 50, 160  # of the film, and milliseconds of each
 PATIENCE = 60_000  # milliseconds
 SOFTWARE = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
 ALONE = "aside, header, #help { display: none !important } canvas { width: 100% !important; height: 100% !important }"
@@ -47,6 +50,18 @@ WITHOUT_HANDLES = """() => {
 }"""
 
 
+TITLES = "each target alone", "live"
+TITLED = """(title) => {
+  const style = "position: fixed; top: 8px; left: 0; right: 0; text-align: center; font-size: 17px; font-weight: 600";
+  document.body.append(made("div", { textContent: title, style }));
+}"""
+TICKED = """([target, seconds]) => {
+  const { session } = page;
+  session.target = target;
+  session.driver.goOn(seconds);
+}"""
+
+
 def main() -> None:
     """Write the pictures of the machines that are named, or of all, and the film."""
     PICTURES.mkdir(exist_ok=True)
@@ -54,7 +69,8 @@ def main() -> None:
     sandbox = ["--no-sandbox"] * (hasattr(os, "geteuid") and os.geteuid() == 0)
     with sync_playwright() as started, tempfile.TemporaryDirectory() as folder:
         browser = started.chromium.launch(executable_path=chromium, args=[*SOFTWARE, *sandbox])
-        for name in sys.argv[1:] or pf.catalog():
+        films = sys.argv[1:] in ([], ["film"])
+        for name in [each for each in sys.argv[1:] if each != "film"] or (() if sys.argv[1:] else pf.catalog()):
             file = Path(folder) / f"{name}.html"
             try:
                 pf.export_web(pf.load(name), file)
@@ -64,12 +80,12 @@ def main() -> None:
                 page = opened(browser, file, scheme, SIZE, BARE)
                 portrait(page).save(PICTURES / f"{name}{end}.webp", quality=QUALITY, alpha_quality=QUALITY, method=6)
                 page.close()
-        if not sys.argv[1:]:
-            for scheme, end in (("light", ""), ("dark", "-dark")):
-                page = opened(browser, Path(folder) / "stewart.html", scheme, FILM_SIZE, STAGED)
-                first, *frames = film(page)
-                options = {"duration": DURATION, "loop": 0, "quality": FILM_QUALITY, "method": 6}
-                first.save(PICTURES / f"film{end}.webp", save_all=True, append_images=frames, **options)
+        for scheme, end in (("light", ""), ("dark", "-dark")) if films else ():
+            file = Path(folder) / "film.html"
+            pf.export_web(pf.load("stewart"), file)
+            first, *frames = film([opened(browser, file, scheme, FILM_SIZE, STAGED) for _ in TITLES])
+            options = {"duration": DURATION, "loop": 0, "quality": FILM_QUALITY, "method": 6}
+            first.save(PICTURES / f"film{end}.webp", save_all=True, append_images=frames, **options)
         browser.close()
 
 
@@ -97,14 +113,25 @@ def portrait(page: Any) -> Image.Image:
     return part.resize((WIDTH, round(WIDTH / ASPECT)), Image.Resampling.LANCZOS)
 
 
-def film(page: Any) -> list[Image.Image]:
-    """The platform follows a circle that leaves its workspace."""
+def film(pages: list[Any]) -> list[Image.Image]:
+    """A platform follows a stream that leaves its reach by far: each target alone, and live, side by side."""
+    machine, phase = pf.load("stewart"), np.linspace(0.0, 2.0 * np.pi, STEPS, endpoint=False)
+    shifts = np.stack([0.9 * np.sin(phase), 0.8 * np.sin(2 * phase + 0.4), 0.9 * np.sin(3 * phase + 1.0)], axis=1)
+    turns = np.stack([0.7 * np.sin(2 * phase), 0.7 * np.sin(phase + 0.7), 0.5 * np.sin(3 * phase)], axis=1)
+    targets = pf.pose(machine.home_pose[:3, 3] + machine.characteristic_length * shifts, rotvec=turns)
+    for page, title in zip(pages, TITLES, strict=True):
+        page.evaluate(TITLED, title)
+    pages[1].evaluate("() => document.querySelector('#pace button').click()")
     frames = []
-    for angle in np.linspace(0.0, 2.0 * np.pi, STEPS, endpoint=False):
-        target = pf.pose([0.0, RADIUS * np.sin(angle), 232.0 - RADIUS * np.cos(angle)])
-        page.evaluate("(target) => page.session.ask(target)", target.ravel().tolist())
-        page.evaluate(SEEN)
-        frames.append(Image.open(io.BytesIO(page.screenshot())).convert("RGB"))
+    for target in targets.reshape(-1, 16).tolist():
+        pages[0].evaluate("(target) => page.session.ask(target)", target)
+        pages[1].evaluate(TICKED, [target, 1e-3 * DURATION])
+        width, height = FILM_SIZE["width"] * len(pages), FILM_SIZE["height"]
+        both = Image.new("RGB", (width, height))
+        for k, page in enumerate(pages):
+            page.evaluate(SEEN)
+            both.paste(Image.open(io.BytesIO(page.screenshot())), (k * FILM_SIZE["width"], 0))
+        frames.append(both.resize((FILM_WIDTH, round(height * FILM_WIDTH / width)), Image.Resampling.LANCZOS))
     return frames
 
 

@@ -151,7 +151,8 @@ def track(
     summary = TrackSummary(mechanism)
     with nullcontext() if output is None else whole_file(output) as handle:
         every = own_limits(mechanism) | limits
-        live = pf.Live(mechanism, speed=every, hold=options.hold, hold_price=options.hold_price) if is_live else None
+        policy = {name: getattr(options, name) for name in ("hold", "hold_price", "rotation_length")}
+        live = pf.Live(mechanism, speed=every, **policy) if is_live else None
         solution = follow(mechanism, blocks, options, every, handle, summary, n_targets, live)
     draw(solution, picture_path, film_path, drawn)
     if as_json:

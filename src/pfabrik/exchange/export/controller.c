@@ -95,8 +95,7 @@ int pfk_ik_or_nearest(pfk_memory *memory, const pfk_pose *target, pfk_pose *pose
    It returns what pfk_limits does, or PFK_NO_ACTUATORS for a speed that is not positive; nothing begins unless 0 is
    returned. `pfk_live_tick` goes on for `dt` seconds, to the nearest pose that drives get to in time: 0 where that is
    the target, else PFK_PROJECTED; for a target that is no pose drives slow down, and PFK_NO_POSE is returned, with
-   where they are. Limits
-   come before accelerations. */
+   where they are. Limits come before accelerations. */
 int pfk_live_begin(pfk_memory *memory, const pfk_pose *pose, const pfk_real speeds[PFK_ACTUATORS],
                    const pfk_real accelerations[PFK_ACTUATORS], pfk_real actuators[PFK_ACTUATORS]);
 int pfk_live_tick(pfk_memory *memory, const pfk_pose *target, pfk_real dt, pfk_pose pose[1],

@@ -14,7 +14,6 @@ from ...common.whole_files import whole_path
 from ...errors import InvalidArgument, UnsupportedMechanism, counted
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.motion.fitting_task import leaves_a_choice
-from ...machine.motion.singularities import loop_blocks
 from ...options import USUAL
 from .driven_bodies import unplaced_masses
 from .equal_rods import with_equal_rods
@@ -137,11 +136,9 @@ def c_source(
     machine = Machine(mechanism, hold_price, equal_rods)
     if parts is None:
         parts = parts_of(machine)
-    for part in {"nearest", "live"} & {*parts} if machine.why_no_nearest else ():
-        reason = f"{machine.why_no_nearest}: leave '{part}' out of `parts` (--parts ik,limits,fk,rates)"
-        raise UnsupportedMechanism(mechanism.name, [reason], "exported")
-    if "live" in parts and loop_blocks(mechanism):
-        reason = "ticks in C do not see the dead points of its loops: leave 'live' out of `parts`"
+    reasons = {"nearest": machine.why_no_nearest, "live": machine.why_no_live}
+    for part in {*parts} & {part for part, reason in reasons.items() if reason}:
+        reason = f"{reasons[part]}: leave '{part}' out of `parts` (--parts ik,limits,fk,rates)"
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
     if "effort" in parts and (reasons := unplaced_masses(machine.mechanism, machine.bodies)):
         raise UnsupportedMechanism(mechanism.name, reasons, "exported with 'effort'")

@@ -18,6 +18,7 @@ from ...kernels.legs import records as K
 from ...kinematics import JointPath, generic_of, joint_path, model_of, require_determined
 from ...machine.decomposition.leg_table import LegTable
 from ...machine.description.mechanism import Mechanism
+from ...machine.motion.singularities import loop_blocks
 from ...machine.moved_bodies import Motion, MovedBodies
 from ...options import USUAL
 from .exported_links import ExportedLinks, exported_links
@@ -184,6 +185,12 @@ class Machine:
         if has_other_assemblies(model.path_closure):
             return "its nearest feasible poses are searched for in all joint coordinates"
         return "" if keeps_links(model) else "its links are kept apart by searches in all joint coordinates alone"
+
+    @property
+    def why_no_live(self) -> str:
+        """The reason why no ticks along a stream are written; empty if they are."""
+        loops = loop_blocks(self.mechanism)
+        return self.why_no_nearest or ("ticks in C do not see the dead points of its loops" if loops else "")
 
     @property
     def completes(self) -> bool:

@@ -11,6 +11,7 @@ from shlex import quote
 import numpy as np
 
 from ...common.checks import require_path
+from ...machine.description.drive_bounds import drive_limits
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.files.units import metres_of
 from ...options import USUAL
@@ -84,6 +85,7 @@ def ros2_node_texts(
     parts: list[Part] = ["ik", "limits", "bodies"]
     parts += [] if machine.uncontrolled else ["fk"]
     parts += [] if machine.why_no_nearest else ["nearest"]
+    parts += [] if machine.why_no_live else ["live"]
     file = f"{name}_kinematics.c"
     texts = {
         f"src/{file}": c_source(mechanism, parts=parts, name=name, hold_price=hold_price, file=file),
@@ -115,10 +117,17 @@ def _words(machine: Machine, description: PlatformDescription, parts: list[Part]
     size, has = mechanism.characteristic_length * metres, features(machine, parts)
     nearest = f"{name}_ik_or_nearest(&memory_, &wanted, &pose, actuators, settings_.steps, settings_.starts, holding)"
     too_near = f" || code > {name.upper()}_PAIR" if "CLEARANCE" in has else ""
+    mosts = zip(*(drive_limits(mechanism, what, None) for what in ("speed", "acceleration")), strict=True)
     actuators = [
-        [_exact(actuator), _truth(each.is_length), *map(literal, (*_units(each.is_length, metres, size), each.home))]
-        for actuator, each in zip(mechanism.actuator_names, machine.driven, strict=True)
+        [_exact(drive.name), _truth(each.is_length)]
+        + [literal(value) for value in (*_units(each.is_length, metres, size), each.home)]
+        + [literal(value if np.isfinite(value) else 0.0) for value in most]
+        for drive, each, most in zip(mechanism.drives, machine.driven, mosts, strict=True)
     ]
+    live = {
+        "BEGIN": f"{name}_live_begin(&memory_, &commanded_.pose, speeds, accelerations, actuators)",
+        "TICK": f"{name}_live_tick(&memory_, &wanted, seconds, &pose, actuators)",
+    }
     limits = []
     for (joint, bound), (value, is_length) in zip(machine.limits, machine.bounds, strict=True):
         unit, whole = _units(is_length, metres, size)
@@ -146,7 +155,12 @@ def _words(machine: Machine, description: PlatformDescription, parts: list[Part]
         "ROTATIONS": str(machine.rotations),
         "HAS_NEAREST": _truth("nearest" in parts),
         "HAS_FORWARD": _truth("fk" in parts),
-        "OUT_OF_REACH": "project" if "nearest" in parts else "hold",
+        "HAS_LIVE": _truth("live" in parts),
+        "OUT_OF_REACH": "live" if "live" in parts else "project" if "nearest" in parts else "hold",
+        "ACTIVE": literal(ACTIVE["double"]),
+        **{
+            f"LIVE_{what}": call if "live" in parts else f"{name.upper()}_NO_ACTUATORS" for what, call in live.items()
+        },
         "ANSWER": nearest if "nearest" in parts else f"{name}_ik(&memory_, &wanted, &pose, actuators)",
         "JUMPED": f"code_ == {name.upper()}_JUMPED" if "nearest" in parts else "false",
         "FORWARD": f"{name}_fk(&memory_, actuators, &pose, nullptr)"

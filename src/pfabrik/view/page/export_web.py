@@ -26,7 +26,7 @@ FOLDER = Path(__file__).parent
 
 SCRIPTS = (
     *("vectors", "meshes", "canvas", "scene", "gizmo", "engine"),
-    *("singular", "slice", "session", "panel", "player", "gestures", "page"),
+    *("singular", "slice", "driver", "session", "panel", "player", "gestures", "page"),
 )
 """Files of `web`, in the order in which a page has them."""
 

@@ -8,17 +8,21 @@ import numpy as np
 
 from ...common.arrays import Floats
 from ...common.memory_image import image_of, packed
+from ...engines.pose.driven_legs import live_tables
 from ...engines.pose.legs_engine import LegsEngine
 from ...engines.pose.seeds import seeds_of
 from ...engines.pose.table import reading_table
 from ...engines.pose.tables import limit_names, tables_of
 from ...kernels.pose import tables as T
 from ...kernels.pose.evaluate import new_evaluation_scratch
+from ...kernels.pose.live_pose import new_live_scratch
 from ...kernels.pose.search_records import new_solutions
 from ...kernels.search_constants import MOVED, SUSPICIOUS, UNDONE
+from ...kernels.ticks import DRIVE
 from ...kinematics import Model, engine_of, joint_path, model_of, passive_series, tilt_axis
 from ...machine.description.joint_coordinates import JointCoordinate
 from ...machine.description.mechanism import Mechanism
+from ...machine.motion.singularities import loop_blocks
 from ...options import USUAL, Options
 from ...tolerances import TOLERANCES
 from ..drawn_parts import free_axes
@@ -60,7 +64,7 @@ def page_data(mechanism: Mechanism, options: Options = USUAL) -> dict[str, Any]:
             "rotations": int(model.task.rotations),
             "only": None if axis is None else axis.tolist(),
         },
-        "actuators": [_row(drive, drive.bounds) for drive in mechanism.drives],
+        "actuators": [_row(drive, drive.bounds) | {"speed": drive.said("max_speed")} for drive in mechanism.drives],
         "series": _series(mechanism),
         "hasLimits": mechanism.without_limits() != mechanism,
         "drawing": drawing_of(mechanism, answers_itself, box),
@@ -71,7 +75,8 @@ def page_data(mechanism: Mechanism, options: Options = USUAL) -> dict[str, Any]:
 
 def _tables(model: Model, options: Options) -> dict[str, Any]:
     """What the kernels in the page ask: the machine's tables as an image of memory, and the names of their entries."""
-    legs, tables, image = model.legs, tables_of(model, options), image_of(_records(model, options))
+    legs, tables, records = model.legs, tables_of(model, options), _records(model, options)
+    image = image_of(records)
     return {
         "branches": (np.sign(legs.home_sides[0]) if legs.has_sides else 0.0 * legs.home_sides[0]).tolist(),
         "arms": legs.implicit_joints["leg"].tolist() if legs.has_free_redundant else [],
@@ -81,7 +86,10 @@ def _tables(model: Model, options: Options) -> dict[str, Any]:
             [int(row["column"]), float(row["lo"] * row["unit"]), float(row["hi"] * row["unit"]), float(row["unit"])]
             for row in legs.limited
         ],
-        "question": {name: place for place, name in enumerate(T.QUESTION.names or ())},
+        "question": _places(T.QUESTION),
+        "drive": _places(DRIVE),
+        "driven": [] if loop_blocks(model.mechanism) else legs.driven[["column", "unit"]].tolist(),
+        "multipliers": len(records["liveHessian"].multipliers),
         "active": TOLERANCES.active,
         "holding": TOLERANCES.holding,
         "jump": {
@@ -92,6 +100,11 @@ def _tables(model: Model, options: Options) -> dict[str, Any]:
         },
         "image": {"data": packed(image.data), "size": image.size, "moved": image.moved, "places": image.places},
     }
+
+
+def _places(record: np.dtype[Any]) -> dict[str, int]:
+    """Where the fields of a record are, counted in words."""
+    return {name: place for place, name in enumerate(record.names or ())}
 
 
 class _Target(NamedTuple):
@@ -123,6 +136,8 @@ def _records(model: Model, options: Options) -> dict[str, tuple[Any, ...]]:
         for name in ("legs", "near")
     }
     reading, weighing = reading_table(model.legs).record, T.new_weighing_scratch(tables)
+    live = live_tables(model, options, np.ones(actuators), np.full(actuators, np.inf))
+    scratch = new_live_scratch(live)
     return {
         "tables": tables,
         "free": tables._replace(**free),
@@ -134,6 +149,10 @@ def _records(model: Model, options: Options) -> dict[str, tuple[Any, ...]]:
         "values": _Values(np.zeros((1, actuators))),
         "weighing": weighing,
         "weights": _Weights(np.zeros(len(weighing.search.first.linear.h))),
+        "live": live,
+        "liveState": live.state,
+        "liveScratch": scratch,
+        "liveHessian": scratch.search.hessian,
         "question": T.Question(_question()),
         "answer": new_solutions(1, legs, actuators),
         "reading": reading,

@@ -44,6 +44,7 @@ public:
     if (show_ == "measured" && !kHasForward) {
       throw std::invalid_argument("show: this machine's actuators do not determine its pose; expected achieved or nothing");
     }
+    tick_ = 1.0 / number("rate", 100.0, 0.1, 100000.0, "live: commands a second [Hz]");
     heard_.fill(kNaN);
     command_.data.resize(kActuators);
     command_state_.position.resize(kActuators);
@@ -79,6 +80,11 @@ public:
     if (show_ != "nothing") {
       joint_publisher_ = create_publisher<JointState>("~/joint_states", usual);
       transform_publisher_ = create_publisher<tf2_msgs::msg::TFMessage>("/tf", usual);
+    }
+    if (platform_.is_live()) {
+      tick_timer_ = create_wall_timer(nanoseconds(tick_), [this]() { tick(); });
+    }
+    if (show_ != "nothing") {
       show_timer_ = create_wall_timer(nanoseconds(1.0 / rate), [this]() { show(); });
     }
     report_timer_ = create_wall_timer(nanoseconds(every), [this]() { report(); });
@@ -140,12 +146,22 @@ private:
   Settings settings()
   {
     Settings settings;
-    const char * usual = kHasNearest ? "project" : "hold";
-    settings.projects =
-      choice("out_of_reach", usual, {"project", "hold"}, "what a target out of reach commands") == "project";
+    const char * usual = kHasLive ? "live" : kHasNearest ? "project" : "hold";
+    const auto policy =
+      choice("out_of_reach", usual, {"live", "project", "hold"}, "how targets are followed, and what one out of reach commands");
+    settings.projects = policy != "hold";
+    settings.is_live = policy == "live";
+    if (settings.is_live && !kHasLive) {
+      throw std::invalid_argument("out_of_reach: no ticks of this machine are written; expected project or hold");
+    }
     if (settings.projects && !kHasNearest) {
       throw std::invalid_argument("out_of_reach: no nearest pose is found for this machine; expected hold");
     }
+    settings.speed = number(
+      "speed", settings.speed, 1e-6, 1e6, "live: most speed of an actuator that has none in the description [L or rad, per s]");
+    settings.acceleration = number(
+      "acceleration", settings.acceleration, 0.0, 1e9,
+      "live: most acceleration of an actuator that has none in the description [L or rad, per s2]; 0.0: none");
     settings.steps =
       static_cast<int>(number<std::int64_t>("steps", settings.steps, 1, 10000, "most steps of a search out of reach"));
     settings.starts = static_cast<int>(
@@ -167,27 +183,56 @@ private:
     const auto & q = target.pose.orientation;
     const Status before = platform_.status();
     refusal_ = refusal(target);
-    const Status status =
-      refusal_.empty() ? platform_.target({{at.x, at.y, at.z}, {q.x, q.y, q.z, q.w}}) : platform_.refuse();
-    ++counts_[static_cast<std::size_t>(status)];
-    if (status == Status::kReached || status == Status::kProjected) {
-      is_begun_ = true;
-      const auto & actuators = platform_.commanded().actuators;
-      if (command_publisher_) {
-        std::copy(actuators.begin(), actuators.end(), command_.data.begin());
-        command_publisher_->publish(command_);
-      } else {
-        std::copy(actuators.begin(), actuators.end(), command_state_.position.begin());
-        command_state_.header.stamp = now();
-        command_state_publisher_->publish(command_state_);
-      }
-      put(platform_.commanded().pose, achieved_.pose);
+    const Pose wanted{{at.x, at.y, at.z}, {q.x, q.y, q.z, q.w}};
+    if (platform_.is_live() && refusal_.empty() && (is_begun_ || platform_.begin_live())) {
+      is_begun_ = is_new_ = true;
+      aim_ = wanted;
       achieved_.header.stamp = target.header.stamp;
-      achieved_publisher_->publish(achieved_);
+      return;
+    }
+    const Status status = !refusal_.empty()     ? platform_.refuse()
+                          : platform_.is_live() ? platform_.status()
+                                                : platform_.target(wanted);
+    ++counts_[static_cast<std::size_t>(status)];
+    if (!platform_.is_live() && (status == Status::kReached || status == Status::kProjected)) {
+      is_begun_ = true;
+      achieved_.header.stamp = target.header.stamp;
+      command();
     }
     if (status != before) {
       report();
     }
+  }
+
+  // Live: the next command on the way to the last target; none where actuators are no longer measured.
+  void tick()
+  {
+    is_begun_ = is_begun_ && (open_loop_ || stopped() == kActuators);
+    if (!is_begun_) {
+      return;
+    }
+    const Status before = platform_.status(), status = platform_.tick(aim_, tick_);
+    counts_[static_cast<std::size_t>(status)] += is_new_ ? 1 : 0;
+    is_new_ = false;
+    command();
+    if (status != before) {
+      report();
+    }
+  }
+
+  void command()
+  {
+    const auto & actuators = platform_.commanded().actuators;
+    if (command_publisher_) {
+      std::copy(actuators.begin(), actuators.end(), command_.data.begin());
+      command_publisher_->publish(command_);
+    } else {
+      std::copy(actuators.begin(), actuators.end(), command_state_.position.begin());
+      command_state_.header.stamp = now();
+      command_state_publisher_->publish(command_state_);
+    }
+    put(platform_.commanded().pose, achieved_.pose);
+    achieved_publisher_->publish(achieved_);
   }
 
   // Why a target is refused whatever it is; empty: it is not. Where the machine stands must be known, and once states
@@ -410,7 +455,10 @@ private:
   std::string base_frame_, platform_frame_, show_, refusal_;
   // Whether an actuator was heard, all of them were and the pose there is known, and a command followed from there.
   bool is_heard_ = false, is_measured_ = false, is_begun_ = false, open_loop_ = false;
-  double states_timeout_ = 0.0;
+  // Live: the last target, whether no tick has gone towards it yet, and the time of a tick [s].
+  Pose aim_{};
+  bool is_new_ = false;
+  double tick_ = 0.01, states_timeout_ = 0.0;
   std::array<double, kActuators> heard_;
   std::array<rclcpp::Time, kActuators> heard_at_;
   int measured_code_ = 0;
@@ -426,7 +474,7 @@ private:
   rclcpp::Publisher<tf2_msgs::msg::TFMessage>::SharedPtr transform_publisher_;
   rclcpp::Subscription<PoseStamped>::SharedPtr target_subscription_;
   rclcpp::Subscription<JointState>::SharedPtr actuator_subscription_;
-  rclcpp::TimerBase::SharedPtr show_timer_, report_timer_;
+  rclcpp::TimerBase::SharedPtr tick_timer_, show_timer_, report_timer_;
 };
 }  // namespace @NAME@_node
 

@@ -24,17 +24,18 @@ constexpr std::size_t kJoints = @N_JOINTS@;
 constexpr double kMetres = @METRES@;  // the machine's unit of length
 constexpr double kClearance = @CLEARANCE@, kRounding = @ROUNDING@;  // that links keep, and within which they are at it [m]
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kInfinity = std::numeric_limits<double>::infinity();
-constexpr bool kHasNearest = @HAS_NEAREST@, kHasForward = @HAS_FORWARD@;
+constexpr double kActive = @ACTIVE@;  // room within which what is commanded is at a limit [characteristic lengths, or rad]
+constexpr bool kHasNearest = @HAS_NEAREST@, kHasForward = @HAS_FORWARD@, kHasLive = @HAS_LIVE@;
 constexpr bool kAxes[3] = {@AXES@};  // that the task sets
 constexpr int kRotations = @ROTATIONS@;  // 3: the rotation is set, 2: the direction of z, 1: the yaw, 0: nothing
 
 // An actuator: a length, whose unit is kMetres and whose size the characteristic length [m], or an angle, both 1; home
-// in its unit.
+// in its unit, and the most of its speed and acceleration, per s and s2; 0: the description has none.
 struct Actuator
 {
   const char * name;
   bool is_length;
-  double unit, size, home;
+  double unit, size, home, speed, acceleration;
 };
 constexpr Actuator kActuatorTable[] = {
 @ACTUATOR_TABLE@};
@@ -78,7 +79,9 @@ inline const char * word(Status status)
 
 struct Settings
 {
+  bool is_live = kHasLive;  // ticks go towards the last target, no faster than actuators may
   bool projects = true;  // out of reach: to the nearest feasible pose, else the last command stays
+  double speed = 0.1, acceleration = 0.0;  // of actuators that have none [characteristic lengths or rad, per s, s2]
   int steps = 100, starts = 0;  // of the search for it
   // An actuator that would move farther from one command to the next refuses the target [characteristic lengths, or
   // rad]; 0: none does.
@@ -113,6 +116,7 @@ public:
     put_limits();
   }
 
+  bool is_live() const { return settings_.is_live; }
   Status status() const { return status_; }
   // The reason in words, where the status is not kReached: out of reach it is what is in the way at the target.
   const char * reason() const { return jump_ < kActuators ? "a jump of an actuator" : @NAME@_what(code_); }
@@ -157,6 +161,48 @@ public:
   int pair() const { return pair_; }
   double between_links() const { return between_ * kMetres; }
 
+  // Let the machine rest where it is commanded to be, and go from there by `tick`. Where that is beyond a limit, as
+  // measured ones may be by a hair, it begins at the nearest feasible pose. False where it cannot.
+  bool begin_live()
+  {
+    if (put_at_rest()) {
+      return true;
+    }
+    target(pose_of(commanded_.pose));
+    if ((status_ == Status::kReached || status_ == Status::kProjected) && put_at_rest()) {
+      return true;
+    }
+    status_ = Status::kRefused;
+    return false;
+  }
+
+  // Go on towards a target for some seconds, no faster than actuators may; they slow down where it is no pose.
+  Status tick(const Pose & target, double seconds)
+  {
+    @NAME@_pose wanted = commanded_.pose, pose = commanded_.pose;
+    const bool is_pose = read(target, wanted);
+    wanted.p[0] = is_pose ? wanted.p[0] : kNaN;
+    double before[kActuators], actuators[kActuators];
+    for (std::size_t i = 0; i < kActuators; ++i) {
+      actuators[i] = before[i] = commanded_.actuators[i] / kActuatorTable[i].unit;
+    }
+    code_ = @LIVE_TICK@;
+    @COUNT_TURNS@
+    static_cast<void>(before);
+    jump_ = kActuators;
+    has_jumped_ = false;
+    command(pose, actuators, wanted);
+    for (std::size_t i = 0; i < kLimits; ++i) {
+      holding_[i] = room(i) <= kActive * kLimitTable[i].size;
+    }
+    if (!is_pose) {
+      return refuse();
+    }
+    const bool is_reached = code_ == 0;
+    put_reason(wanted);
+    return status_ = is_reached ? Status::kReached : Status::kProjected;
+  }
+
   // Command a target from the last command: the same working mode, and the nearest feasible pose out of reach.
   Status target(const Pose & target)
   {
@@ -179,12 +225,7 @@ public:
       return refuse();
     }
     const bool is_reached = code_ == 0;
-    if (code_ == @MACRO@_PROJECTED) {
-      @NAME@_pose away = commanded_.pose;
-      double unused[kActuators];
-      const int code = @NAME@_ik(&memory_, &wanted, &away, unused);  // 0 where it is reached by way of home alone
-      code_ = code == 0 ? code_ : code;
-    }
+    put_reason(wanted);
     if (!is_reached && !(is_near && settings_.projects)) {
       put_errors(wanted);
       return status_ = Status::kHeld;
@@ -198,12 +239,8 @@ public:
         return status_ = Status::kRefused;
       }
     }
-    commanded_.pose = pose;
-    put_actuators(actuators);
-    put_joints(commanded_);
     std::copy(holding, holding + kLimits, holding_.begin());
-    put_limits();
-    put_errors(wanted);
+    command(pose, actuators, wanted);
     return status_ = is_reached ? Status::kReached : Status::kProjected;
   }
 
@@ -275,6 +312,38 @@ private:
       }
     }
     return true;
+  }
+
+  bool put_at_rest()
+  {
+    double speeds[kActuators], accelerations[kActuators], actuators[kActuators];
+    for (std::size_t i = 0; i < kActuators; ++i) {
+      const Actuator & each = kActuatorTable[i];
+      speeds[i] = each.speed > 0.0 ? each.speed : settings_.speed * each.size / each.unit;
+      accelerations[i] = each.acceleration > 0.0 ? each.acceleration : settings_.acceleration * each.size / each.unit;
+    }
+    static_cast<void>(actuators);
+    return (code_ = @LIVE_BEGIN@) == 0;
+  }
+
+  void command(const @NAME@_pose & pose, const double * actuators, const @NAME@_pose & wanted)
+  {
+    commanded_.pose = pose;
+    put_actuators(actuators);
+    put_joints(commanded_);
+    put_limits();
+    put_errors(wanted);
+  }
+
+  // The code of what is in the way at a target out of reach.
+  void put_reason(const @NAME@_pose & wanted)
+  {
+    if (code_ == @MACRO@_PROJECTED) {
+      @NAME@_pose away = commanded_.pose;
+      double unused[kActuators];
+      const int code = @NAME@_ik(&memory_, &wanted, &away, unused);  // 0 where it is reached by way of home alone
+      code_ = code == 0 ? code_ : code;
+    }
   }
 
   void put_actuators(const double * actuators)

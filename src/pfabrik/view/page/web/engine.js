@@ -4,6 +4,7 @@ const PENDING = 9, UNSURE = 10;
 const SHORTEST_STEP = 1e-8, MOST_STEPS_OF_TRAVEL = 400;
 const INWARD = [1e-13, 1e-12, 1e-11, 1e-10];
 const ALIKE = 0.999;
+const AT_REST = 1e-7, AT_SPEED = 0.999;
 const MOST_BRANCHES = 6, SAME_MODE = 1e-5;
 const isSame = (a, b) => a.every((mark, k) => Math.abs(mark - b[k]) <= SAME_MODE);
 
@@ -35,14 +36,21 @@ class Engine {
     this.question = this.view("question.asked", Object.keys(machine.question).length, BigInt64Array);
     this.status = this.view("answer.status", 1, BigInt64Array);
     const { branches, actuators, columns } = machine;
-    const lengths = { poses: 16, sides: branches.length, q: branches.length, actuators: actuators.length, measures: 5 };
+    const lengths = { poses: 16, sides: branches.length, q: branches.length, actuators: actuators.length, measures: 5, targets: 16, pose: 16 };
     const fields = (record, names) => Object.fromEntries(names.map((name) => [name, this.view(`${record}.${name}`, lengths[name])]));
     this.start = fields("start", ["poses", "sides", "actuators"]);
-    this.answer = fields("answer", Object.keys(lengths));
+    this.answer = fields("answer", ["poses", "sides", "q", "actuators", "measures"]);
     this.target = this.view("target.targets", 16);
     this.values = this.view("values.values", actuators.length);
     this.weights = this.view("weights.weights", machine.limits.length);
     this.coordinates = this.view("read.coordinates", columns);
+    if (machine.driven.length) {
+      this.drives = this.view("live.drives", machine.driven.length * Object.keys(machine.drive).length);
+      this.ticked = { ...fields("live", ["targets", "pose", "actuators"]), ...fields("liveScratch", ["measures"]) };
+      this.tickStatus = this.view("live.tick", 1, BigInt64Array);
+      this.state = fields("liveState", ["pose", "sides", "q"]);
+      this.multipliers = this.view("liveHessian.multipliers", machine.multipliers);
+    }
     const home = fields("home", ["poses", "sides", "actuators"]);
     this.home = { status: REACHED, pose: [...home.poses], branch: [...home.sides], actuators: [...home.actuators] };
   }
@@ -145,6 +153,48 @@ class Engine {
     kernels.evaluate_poses(...[...places, ...filled].map((name) => this.at(name)));
     this.machine.actuators.forEach(({ column, home }, k) => (coordinates[column] = actuators[k] - home));
     return [...coordinates];
+  }
+
+  /** Let the machine rest at an answer, where drives begin; false where that is beyond limits. */
+  rest({ status, pose, branch, actuators }) {
+    if (!actuators || status > PROJECTED) return false;
+    const { machine, state } = this;
+    state.pose.set(withLengths(pose, 1 / machine.length));
+    state.sides.set(branch);
+    state.q.fill(0);
+    this.multipliers.fill(0);
+    this.kernels.place(this.at("live"), this.at("liveScratch"));
+    machine.driven.forEach((_, k) => {
+      this.drives[this.placeOf(k, "rate")] = 0;
+      this.drives[this.placeOf(k, "aim")] = NaN;
+    });
+    return true;
+  }
+
+  placeOf(k, field) {
+    return k * Object.keys(this.machine.drive).length + this.machine.drive[field];
+  }
+
+  /** Some seconds on towards a target, at most as fast as drives may [length or rad, per s]: the answer there. */
+  tick(target, seconds, speeds) {
+    const { drives, ticked, state, machine } = this;
+    machine.driven.forEach(([column, unit], k) => (drives[this.placeOf(k, "speed")] = speeds[column] / unit));
+    const before = [...ticked.actuators];
+    ticked.targets.set(target);
+    this.kernels.go_on(this.at("live"), this.at("liveScratch"), seconds);
+    const answer = {
+      status: Number(this.tickStatus[0]), pose: [...ticked.pose], branch: [...state.sides], proximal: [...state.q],
+      actuators: [...ticked.actuators], errors: [...ticked.measures],
+    };
+    const shares = answer.actuators.map((value, k) => Math.abs(value - before[k]) / (speeds[k] * seconds));
+    answer.isMoving = Math.max(...shares) > AT_REST;
+    const fast = machine.actuators.filter((_, k) => shares[k] > AT_SPEED).map(({ joint }) => ({ joint, bound: "speed" }));
+    answer.isOnItsWay = answer.status === PROJECTED && fast.length > 0;
+    this.complete(answer);
+    if (answer.isOnItsWay) answer.limits.unshift(...fast);
+    if (answer.status !== PROJECTED || answer.isOnItsWay) return answer;
+    this.target.set(target);
+    return { ...answer, limits: this.holding() };
   }
 
   /** The limits that hold the answer in memory back, the largest multiplier first; like ones as they are described. */

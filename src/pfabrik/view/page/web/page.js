@@ -27,6 +27,7 @@ class Page {
     session.engine = engine;
     this.gizmo.isStill = !!engine.isStill;
     this.hasSlice &&= !!engine.reachTest;
+    $("#pace").hidden = !engine.drives;
     document.documentElement.classList.toggle("still", !!engine.isStill);
     $("#slice").hidden = !this.hasSlice;
     session.onChange = () => this.show();
@@ -99,7 +100,7 @@ class Page {
     if (answer.actuators) this.live?.more();
     this.later = null;
     this.delay = Math.max(MORE_AFTER, 3 * (performance.now() - began));
-    if (this.gestures?.held || this.player?.clock || engine.newest?.isBusy) return;
+    if (this.gestures?.held || this.player?.clock || session.driver?.clock || engine.newest?.isBusy) return;
     session.remember();
     this.showSteps();
     this.keepLink();
@@ -204,6 +205,18 @@ class Page {
     this.addSwitch("#slice", (isOn) => {
       this.hidesSlice = !isOn;
       this.showSlice();
+    });
+    const driver = new Driver(session), [pace, speed] = [$("#pace input"), $("#pace output")];
+    const showPace = () => {
+      driver.slower(Number(pace.value));
+      $("#pace").style.setProperty("--share", `${100 * pace.value}%`);
+      speed.textContent = this.panel.wording.speed(driver.speeds, this.machine.actuators) ?? `${rounded(100 * driver.share, 0)} %`;
+    };
+    pace.oninput = showPace;
+    showPace();
+    this.addSwitch("#pace button", (isOn) => {
+      session.driver = isOn ? driver : null;
+      if (!isOn) driver.stop();
     });
     this.addSwitch("#solids", (isOn) => (this.scene.hidesSolids = !isOn));
     $("#solids").hidden = !drawing.parts.some((part) => part.shape !== undefined);

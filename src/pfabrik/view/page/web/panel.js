@@ -25,6 +25,13 @@ class Wording {
     return rounded(value * this.factor, this.digits);
   }
 
+  /** The speed of drives that are all alike; null where they are not. */
+  speed(speeds, drives) {
+    const { isAngle } = drives[0];
+    const isAlike = speeds.every((speed, k) => Math.abs(speed - speeds[0]) < 1e-6 * speeds[0] && drives[k].isAngle === isAngle);
+    return isAlike ? `${this.value(speeds[0], isAngle)}${isAngle ? "" : ` ${this.unit}`}/s` : null;
+  }
+
   value(value, isAngle) {
     return isAngle ? `${rounded(value / DEGREE, 1)}°` : this.length(value);
   }
@@ -140,7 +147,7 @@ class Panel {
       [INVALID]: "Not a pose",
     };
     $("#status").className = isFar ? "far" : "reached";
-    $("#status b").textContent = words[answer.status] ?? words[PROJECTED];
+    $("#status b").textContent = answer.isOnItsWay ? "On its way" : words[answer.status] ?? words[PROJECTED];
     $("#status p").textContent = this.explanation();
     const { limits } = answer;
     const shown = limits.slice(0, limits.length > MOST_CHIPS ? MOST_CHIPS - 1 : MOST_CHIPS);
@@ -158,6 +165,7 @@ class Panel {
   explanation() {
     const { answer, wished, hasJumped } = this.session;
     const has = answer.limits.length > 0;
+    if (answer.isOnItsWay) return "Every limit kept, all loops closed. As fast as it may, by";
     const kept = this.machine.hasLimits ? "Every limit kept, all loops closed." : "All loops closed; this machine has no limits.";
     if (answer.status === REACHED) return has ? "Every limit kept; it lies on" : kept;
     if (answer.status === EXCEEDED) return "The loops close in this mode, but beyond";

@@ -15,6 +15,7 @@ class Session {
     this.begin(gesture);
     this.start = start;
     if (this.engine.isRemote) return this.askFar(state);
+    if (this.driver && !isFresh) return this.driver.follow(state);
     let answer = this.timed(() => this.engine.ask(target, start));
     const isKept = start !== null && answer.actuators !== null;
     if (start && !isKept) answer = this.engine.ask(target, null);
@@ -30,6 +31,7 @@ class Session {
     if (this.engine.isRemote) return this.askFar(state);
     const start = this.answer.actuators ? this.answer : null;
     const answer = this.timed(() => this.engine.assemble(values, start));
+    if (this.driver && answer.actuators) return this.driver.follow({ ...state, target: [...answer.pose], wished: answer.actuators });
     this.settle({ ...state, target: [...answer.pose], answer, hasJumped: false });
   }
 
@@ -60,7 +62,8 @@ class Session {
   }
 
   goHome() {
-    if (this.engine.home.q) this.take(this.engine.home);
+    if (this.driver) this.ask(this.machine.home);
+    else if (this.engine.home.q) this.take(this.engine.home);
     else this.ask(this.machine.home, { isFresh: true });
   }
 
