@@ -14,7 +14,7 @@ from machines import machine as made
 from pfabrik.capabilities.paths import path as path_module
 from pfabrik.cli import main
 from pfabrik.common.cells import marked
-from pfabrik.errors import InvalidArgument
+from pfabrik.errors import InvalidArgument, UnknownName
 
 
 def read(tmp_path: Path, text: str, name: str = "path.nc", machine: str = "stewart", **options: float) -> Any:
@@ -422,11 +422,13 @@ def test_a_recording_with_columns_and_units_of_its_own(tmp_path: Path) -> None:
     [
         ({"x": "surge"}, None, "no column 'surge'; expected one of those there: t, x, y, z"),
         ({"x": 3}, None, r"columns\['x'\]"),
+        ({"rol": "roll"}, None, "no column named 'rol'; did you mean 'roll'"),
+        (None, {"surge": 2.0}, "no column named 'surge'"),
         (None, -1.0, "scale"),
         (None, {"x": 0.0}, "scale of 'x'"),
     ],
 )
 def test_columns_that_are_not_there(columns: Any, scale: Any, words: str, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("t,x,y,z\n0,0,0,195\n1,1,0,195\n")
-    with pytest.raises(InvalidArgument, match=words):
+    with pytest.raises((InvalidArgument, UnknownName), match=words):
         pf.read_path(tmp_path / "a.csv", made("stewart"), columns=columns, scale=scale)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...common.arrays import Floats
 from ...common.cells import unmarked
-from ...common.checks import require_mapping, require_positive
+from ...common.checks import require_known, require_mapping, require_positive
 from ...common.csv_columns import CsvColumns, CsvRows
 from ...common.text_lines import WrongText
 from ...errors import InvalidArgument, near_miss
@@ -60,7 +60,7 @@ class CsvTable:
         header = self._table.header
         missing = [column for name, column in as_named.columns.items() if name not in header]
         if missing:
-            known = ", ".join(name.removeprefix(OF_FILE) for name in header)
+            known = ", ".join(as_named.columns.get(name, name.removeprefix(OF_FILE)) for name in header)
             raise WrongText(f"line {self._table.line}: no column '{missing[0]}'; expected one of those there: {known}")
         by_joints = not any(name in OF_POSES for name in header)
         self._joints = joint_columns(mechanism, header) if by_joints else None
@@ -122,13 +122,15 @@ OF_FILE = "file_"
 """Before the name of a column that the file calls so, where another was named so."""
 
 
-def named_columns(columns: Any, scale: Any) -> NamedColumns:
-    """Names and factors of columns, checked."""
+def named_columns(mechanism: Mechanism, columns: Any, scale: Any) -> NamedColumns:
+    """Names and factors of the columns of targets for a mechanism, checked."""
     names = require_mapping("columns", columns, "name -> what the file calls the column")
     for name, column in names.items():
         if not isinstance(column, str):
             raise InvalidArgument(f"columns['{name}']", repr(column), "what the file calls the column")
     scales = scale if isinstance(scale, Mapping) else dict.fromkeys(LENGTHS, scale) if scale is not None else {}
+    joints = [f"{name}{unit}" for name in mechanism.coordinate_names for unit in ("", "_deg", "_rad")]
+    require_known("column", (*names, *scales), (*NUMERIC, *joints))
     for name, factor in scales.items():
         require_positive(f"scale of '{name}'", factor)
     return NamedColumns(dict(names), {name: float(factor) for name, factor in scales.items()})

@@ -121,7 +121,7 @@ def path_blocks(
     for option, value in lengths_and_times.items():
         if value is not None:
             require_positive(option, value)
-    as_named = named_columns({} if columns is None else columns, scale)
+    as_named = named_columns(mechanism, {} if columns is None else columns, scale)
     file = require_path("path", path)
     name = "standard input" if str(file) == "-" else str(file)
     with refusing(name, "CSV or G-code that can be followed"), _opened(file) as handle:

@@ -158,9 +158,7 @@ def _words(machine: Machine, description: PlatformDescription, parts: list[Part]
         "HAS_LIVE": _truth("live" in parts),
         "OUT_OF_REACH": "live" if "live" in parts else "project" if "nearest" in parts else "hold",
         "ACTIVE": literal(ACTIVE["double"]),
-        **{
-            f"LIVE_{what}": call if "live" in parts else f"{name.upper()}_NO_ACTUATORS" for what, call in live.items()
-        },
+        **{f"LIVE_{what}": call if "live" in parts else f"{name.upper()}_NO_ACTUATORS" for what, call in live.items()},
         "ANSWER": nearest if "nearest" in parts else f"{name}_ik(&memory_, &wanted, &pose, actuators)",
         "JUMPED": f"code_ == {name.upper()}_JUMPED" if "nearest" in parts else "false",
         "FORWARD": f"{name}_fk(&memory_, actuators, &pose, nullptr)"
