@@ -197,7 +197,7 @@ def test_coordinates_out_of_reach_are_projected_and_the_limit_is_named() -> None
     assert list(np.asarray(x.status)) == [Status.REACHED, Status.PROJECTED, Status.PROJECTED, Status.PROJECTED]
     assert not x and [(limit.joint, limit.bound) for limit in x.solution[1].active_limits] == [("roll_joint", "max")]
     assert (margin.margin > 0.0).tolist() == [True, False, False, False]
-    assert margin.bound[1:].tolist() == ["max", "reach", "max"]
+    assert margin.bound[1:].tolist() == ["max", "stretched", "max"]
     assert margin.joint[1:].tolist() == ["roll_joint", "right_motor_joint", "pitch_joint"]
     np.testing.assert_allclose(a.to_joints(x.values[1]).values, [0.0, a.high[1]], atol=1e-6)
 
@@ -217,7 +217,7 @@ def test_nothing_is_nan_at_and_beyond_dead_points() -> None:
     margin = a.margin(q)
     assert abs(margin.margin[-2]) < 1e-3
     assert margin.bound[-2] == "dead point" and margin.joint[-2].endswith("motor_joint")
-    assert margin.bound[last + 1] == "reach" and margin.margin[-1] <= 1e-3
+    assert margin.bound[last + 1] == "stretched" and margin.margin[-1] <= 1e-3
     force = a.torques_to_actuators(q, [1.0, 1.0])
     for values in (a.to_actuators(q).values, a.jacobian(q), force, a.armature(q, 1.0), margin.margin):
         assert np.isfinite(values).all()

@@ -18,7 +18,8 @@ from machines.published import PUBLISHED, moved_from_home
 from oracles import search
 from paper import geometric
 from pfabrik import Mechanism, Solution, Status
-from pfabrik.machine.catalog import catalog_file, description
+from pfabrik.machine.catalog import catalog_file, description, template
+from pfabrik.machine.files import loads
 
 Array = NDArray[np.float64]
 NAMES = pf.catalog()
@@ -220,3 +221,26 @@ def test_the_scara_moves_its_tool_as_its_parameters_say() -> None:
     found = pf.solve_fk(mechanism, np.stack([first, second, drop, wrist], axis=1))
     assert found
     np.testing.assert_allclose(found.pose, expected, atol=1e-9 * 600)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [("spherical-3rrr", "agile_eye"), ("orthoglide", "orthoglide"), ("tricept", "tricept")]
+)
+def test_a_starting_file_with_published_dimensions_is_the_machine_of_the_catalogue(kind: str, name: str) -> None:
+    made, supplied = loads(template(kind)), pf.load(name)
+    moves = np.random.default_rng(3).uniform(-0.1, 0.1, (20, 6)) * supplied.characteristic_length
+    targets = pf.pose(supplied.reference_point + moves[:, :3], rotvec=moves[:, 3:] / supplied.characteristic_length)
+    one, other = (pf.solve_ik(machine, targets) for machine in (made, supplied))
+    homes = (pf.solve_ik(machine, machine.home_pose).actuators for machine in (made, supplied))
+    assert (one.status == pf.Status.REACHED).all()
+    np.testing.assert_allclose(one.actuators - next(homes), other.actuators - next(homes), atol=1e-8)
+
+
+def test_struts_of_the_starting_file_of_an_ankle_are_as_long_as_their_ends_are_apart() -> None:
+    machine = loads(template("ankle-spu"))
+    values, pivot = machine.dimensions, machine.reference_point
+    answer = pf.solve_ik(machine, pf.pose(pivot, rpy=[0.1, 0.2, 0.0]))
+    for actuator, side in zip(answer.actuators, (-1, 1), strict=True):
+        upper = np.array([-values["back"], side * values["side"], 0.0])
+        lower = pivot + answer.pose[:3, :3] @ [-values["back"], side * values["side"], 0.0]
+        assert actuator == pytest.approx(np.linalg.norm(lower - upper), abs=1e-9)

@@ -316,3 +316,39 @@ def test_efforts_of_a_path_go_to_a_file_row_by_row() -> None:
     by_hand = math.radians(float(rows[5]["rate_p1_deg"])) * float(rows[5]["effort_p1"])
     assert float(rows[5]["power_p1"]) == pytest.approx(by_hand)
     check_written(Path("out.svg"))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "plot stewart -o a.png -o b.png",
+        "singularities five_bar -o a.png -o a.pdf",
+        "travel stewart --plot a.png --plot=b.png",
+        "track stewart path.csv -o a.csv --output b.csv",
+        "new delta -o a.toml -oa.toml",
+        "export stewart --web a.html --web b.html",
+    ],
+)
+def test_an_option_of_one_file_that_is_given_twice_is_refused_and_nothing_written(line: str) -> None:
+    before = listed()
+    result = pfabrik(line)
+    assert result.exit_code == 2 and "found it 2 times; expected one file" in result.stderr
+    assert listed() == before
+
+
+def test_every_file_that_is_written_is_named() -> None:
+    Path("path.csv").write_text("x,y,z,t\n0,0,190,0\n0,0,200,1\n0,0,205,2\n")
+    lines = {
+        "new delta -o a.toml": ["a.toml"],
+        "track stewart path.csv -o a.csv": ["a.csv"],
+        "time stewart path.csv --speed 100 -o b.csv": ["b.csv"],
+        "effort stewart path.csv --load platform=1,0,0,200 -o c.csv": ["c.csv"],
+        "export stewart c -o a.c": ["a.h", "a.c"],
+        "export stewart --numpy a.py": ["a.py"],
+        "plot stewart -o a.svg": ["a.svg"],
+        "track stewart path.csv -o - --plot b.svg": ["b.svg"],
+    }
+    for line, files in lines.items():
+        result = pfabrik(line)
+        assert result.exit_code == 0, result.output
+        assert [row.split()[1].rstrip(";") for row in result.stderr.splitlines() if row.startswith("wrote ")] == files

@@ -243,6 +243,23 @@ def test_lines_for_those_who_come_from_elsewhere_run(section: str) -> None:
         eval(line, namespace)
 
 
+CITED = re.compile(r"`(tests/\w+\.py)(?:::(\w+))?`")
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if CITED.search(page.read_text(encoding="utf-8"))], ids=page_id
+)
+def test_tests_that_a_page_cites_are_there(page: Path) -> None:
+    for file, name in CITED.findall(page.read_text(encoding="utf-8")):
+        assert f"def {name or 'test_'}" in (ROOT / file).read_text(encoding="utf-8"), (file, name)
+
+
+def test_every_promise_along_a_motion_has_a_test_that_states_it() -> None:
+    text = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8")
+    rows = [row for row in text.splitlines() if row.startswith("| ") and not row.startswith("| promise")]
+    assert len(rows) > 12 and all(CITED.search(row) for row in rows)
+
+
 @pytest.mark.compiled
 @pytest.mark.usefixtures("folder")
 def test_the_first_program_of_the_readme_prints_what_it_shows(capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,8 +9,10 @@ from typing import Any
 import pytest
 
 from pfabrik import errors
+from pfabrik.common.derived import derived
 from pfabrik.errors import Fault
 
+FAILURE = errors.InvalidArgument("x", "a", "b")
 FAULT = Fault("joint[0].at", "nothing", "three numbers")
 PUBLIC = [
     errors.PfabrikError("anything"),
@@ -49,3 +51,29 @@ def test_a_continuum_says_what_is_given_and_what_still_moves() -> None:
 def test_what_was_found_takes_one_line_however_long_it_is(name: Any) -> None:
     for error in (errors.UnknownName("joint", name, ["p1"]), errors.InvalidArgument("name", repr(name), "a name")):
         assert "\n" not in str(error) and len(str(error)) < 500
+
+
+class Kept:
+    """An object that keeps what is derived from it."""
+
+
+def test_a_refusal_of_a_derived_value_has_no_other_error_behind_it() -> None:
+    @derived
+    def refused(owner: Kept, *more: int) -> None:
+        raise FAILURE
+
+    for more in ((), (1,), (1, 2)):
+        with pytest.raises(errors.InvalidArgument) as caught:
+            refused(Kept(), *more)
+        assert caught.value.__context__ is None and caught.value.__cause__ is None
+
+
+def test_a_derived_value_of_nothing_is_kept_too() -> None:
+    calls = []
+
+    @derived
+    def nothing(owner: Kept) -> None:
+        calls.append(owner)
+
+    kept = Kept()
+    assert nothing(kept) is nothing(kept) is None and len(calls) == 1

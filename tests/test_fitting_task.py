@@ -19,7 +19,7 @@ from pfabrik.common.rotations import from_rotvec
 from pfabrik.exchange.interop import from_mjcf, to_mjcf
 from pfabrik.machine.catalog import template
 from pfabrik.machine.files import loads
-from pfabrik.machine.motion.fitting_task import fitting_tasks, has_dependent_coordinates
+from pfabrik.machine.motion.fitting_task import fitting_tasks, has_dependent_coordinates, task_hint, what_follows
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
@@ -153,7 +153,37 @@ def test_what_stops_an_end_effector_where_no_limit_does_is_said() -> None:
     assert reached.stopped_by and reached.cause == ""
     free = pf.load("five_bar").without_limits()
     out = pf.travel(pf.solve_ik(free, free.reference_point), along=[0, 0, 1])[0]
-    assert not out.stopped_by and out.cause == "the links are stretched out or folded"
+    assert out.why == "p1 stretched" and out.cause == "the links are stretched out or folded"
+
+
+SET = {"tilt": 2, "yaw": 1, "rotation": 3}
+
+
+@pytest.mark.parametrize("name", [name for name in pf.catalog() if name != "snake60"])
+def test_a_task_of_more_coordinates_than_freedoms_has_a_hint_to_one_that_fits(name: str) -> None:
+    machine = pf.load(name)
+    hint, asked = task_hint(machine), sum(SET.get(word, 1) for word in machine.task)
+    assert bool(hint) == (asked > pf.mobility(machine).platform)
+    if hint:
+        fits = hint.rpartition("fits is ")[2].split()
+        assert sum(SET.get(word, 1) for word in fits) == pf.mobility(machine).platform
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("prs", "task z, tilt: x, y and yaw follow"),
+        ("rps", "task z, tilt: x, y and yaw follow"),
+        ("tricept", "task x, y, z: the rotation follows"),
+        ("delta", ""),  # which never turns
+        ("stewart", ""),
+    ],
+)
+def test_what_follows_from_the_task_is_said_with_an_answer(name: str, said: str) -> None:
+    machine = pf.load(name)
+    assert what_follows(machine) == said
+    assert said in str(pf.solve_ik(machine, machine.home_pose).table())
+    assert ("follow" in str(pf.solve_ik(machine, machine.home_pose).table())) == bool(said)
 
 
 def test_a_leg_of_five_freedoms_is_asked_for_all_five() -> None:

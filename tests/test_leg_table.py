@@ -15,9 +15,9 @@ from machines import closure, machine
 from pfabrik.engines.engine import engine_of
 from pfabrik.engines.joints.configurations import Configurations, new_rows
 from pfabrik.engines.pose.answers import sides_at
+from pfabrik.engines.pose.leg_margins import leg_margins as _margins
 from pfabrik.engines.pose.legs_engine import LegsEngine
 from pfabrik.engines.pose.reach import reach
-from pfabrik.feasibility import _margins
 from pfabrik.kernels.rows import Rows
 from pfabrik.machine.model import Model, model_of
 from pfabrik.machine.motion.mobility import generic_of

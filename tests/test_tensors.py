@@ -41,7 +41,7 @@ def module_of(text: str) -> ModuleType:
 
 
 @cache
-def module(name: str, backend: Any = "numpy", joints: tuple[str, ...] = ("task",)) -> ModuleType:
+def module(name: str, backend: Any = "numpy", joints: tuple[str, ...] | None = None) -> ModuleType:
     """The exported file as a module; skips where its library is not installed."""
     {"torch": torch, "jax": jax}.get(backend, str)()
     return module_of(tensor_source(machine(name), backend=backend, joints=joints))
@@ -208,6 +208,7 @@ def test_machines_without_closed_forms_are_refused_by_name(name: str, said: str,
     [
         ({"joints": ["roll_joint"]}, InvalidArgument, "in series"),
         ({"joints": ["pitch", "roll"]}, UnknownName, "pitch_joint"),
+        ({"joints": "task"}, UnknownName, "no joint named 'task'"),
         ({"backend": "tensorflow"}, InvalidArgument, "backend"),
     ],
 )
@@ -308,10 +309,10 @@ def compiled(made: ModuleType, backend: str) -> Any:
     return SimpleNamespace(with_jacobian=jax().jit(made.with_jacobian)) if backend == "jax" else made
 
 
-def inside(name: str, joints: tuple[str, ...], count: int) -> np.ndarray:
+def inside(name: str, joints: tuple[str, ...] | None, count: int) -> np.ndarray:
     """Coordinates well within all limits."""
     made = module(name, joints=joints)
-    if joints != ("task",):
+    if joints is not None:
         return np.random.default_rng(2).uniform(-0.1, 0.1, (count, len(joints))) + made.DIMENSIONS["joints.home"]
     targets = known(name, 200)[0]
     margins = made.margins(targets)
@@ -328,7 +329,7 @@ DIFFERENCED_JAX = [("g1_ankle", True), ("delta", False), ("stewart", False), ("a
 
 def check_gradients(name: str, by_joints: bool, backend: str) -> None:
     """Derivatives by the dimensions, of actuators and where they lead, are those of differences of the NumPy file."""
-    joints = series(name) if by_joints else ("task",)
+    joints = series(name) if by_joints else None
     plain, made = module(name, joints=joints), module(name, backend, joints)
     random, q = np.random.default_rng(6), inside(name, joints, 3)
     p, actuators, forward = plain.parameters(), plain.to_actuators(q), "to_joints" if by_joints else "to_pose"
@@ -377,7 +378,7 @@ def test_gradients_of_all_machines_in_jax_are_those_of_differences(name: str, by
     ("name", "by_joints"), [("g1_ankle", True), ("ankle_ups", True), ("delta", False), ("stewart", False)]
 )
 def test_no_gradient_is_nan_at_and_beyond_dead_points(name: str, by_joints: bool) -> None:
-    joints = series(name) if by_joints else ("task",)
+    joints = series(name) if by_joints else None
     made = module(name, "torch", joints)
     random = np.random.default_rng(4)
     if by_joints:

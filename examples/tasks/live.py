@@ -94,8 +94,8 @@ print(f"{live.lag:.0f} mm from the target, at rest; held by {', '.join(sorted(li
 #
 # ## By hand
 #
-# The page of a machine (`pfabrik export stewart --web stewart.html`, `pfabrik view stewart`) has a switch, *Live*, and a
-# slider of the speed beside it: drag the platform far away, and see how the machine follows and what holds it.
+# The page of a machine (`pfabrik export stewart --web stewart.html`, `pfabrik view stewart`) has a switch, *Live*, and
+# a slider of the speed beside it: drag the platform far away, and see how the machine follows and what holds it.
 #
 # ## What it costs
 #
@@ -103,3 +103,5 @@ print(f"{live.lag:.0f} mm from the target, at rest; held by {', '.join(sorted(li
 # itself alone: where a workspace falls into parts, or an arm has folded into a corner, another part may be nearer to
 # the target; `solve_ik` finds it, and only a motion that you plan leads there. Parallel singularities are passed as the
 # target leads, although drives do not hold the platform there: keep streams away from them (`pf.singularity_map`).
+#
+# What else holds along a motion, and what does not: [Safety](../safety.md).

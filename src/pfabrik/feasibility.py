@@ -19,29 +19,21 @@ from .common.telling import OnProgress, telling
 from .engines.engine import engine_of, legs_decide
 from .engines.joints.configurations import Configurations
 from .engines.joints.link_distances import least_distances, pair_names
-from .engines.joints.parasitic import has_parasitic_motion
 from .engines.pose.answers import sides_at
 from .engines.pose.branch import starts_beside
+from .engines.pose.leg_margins import leg_margins
 from .engines.pose.links_at_poses import links_at_poses
-from .engines.pose.table import table_handle
 from .engines.pose.tip_engine import measured, start_at_tip
 from .engines.targets import Target, as_targets
 from .errors import UnsupportedMechanism, counted
 from .kernels.rows import REACHED
-from .kernels.threads import in_blocks
 from .machine.description.mechanism import Mechanism, checked_mechanism
 from .machine.model import Model, model_of
 from .options import Options
 from .tolerances import TOLERANCES
 
-ROWS_A_BLOCK, ROWS_A_RUN = 1024, 4096
-"""Rows of one call of the kernel for single rows, and of the kernel for blocks."""
-
 ROWS_AT_ONCE = 16384
 """Rows whose links are placed and measured at once: more would need much memory."""
-
-UNKNOWN = -2
-"""Binding of rows that `kernels.legs.margin_blocks` leaves unsolved."""
 
 
 class Feasibility(NamedTuple):
@@ -51,15 +43,16 @@ class Feasibility(NamedTuple):
     ----------
     margin : float or array (...)
         The least margin of all limits: as in `margins` a share of the range, 1 in its middle or on the axis of a cone,
-        0 on a limit, negative beyond it. Where a rod does not reach, minus the gap as a share of its length; where a
+        0 on a limit, negative beyond it. Where a leg does not reach, minus the gap as a share of its length; where a
         leg does not close on the target, minus the residual [L or rad]. NaN for rows that are no poses. Where the
         mechanism has a clearance and no other limit is exceeded, links count too: the rest of their distance as a share
         of L, as in `margins`.
     binding : int or array of int (...)
         Index in `limits` of the limit that has it, the first if several are equal to 1e-9; -1 if there is none.
     limits : tuple of tuple of str
-        Pairs (joint, bound) of every limit: "min", "max" and "cone", as in `margins`; "reach" of a leg's proximal
-        joint, and "not closed" of its first joint; with a clearance, (``BC1–BC3``, "clearance") of every pair of links.
+        Pairs (joint, bound) of every limit: "min", "max" and "cone", as in `margins`; "stretched", or "level" of a
+        rod on an upright slide, of a leg's proximal joint, beyond whose dead point the leg does not reach; "not closed"
+        of its first joint; with a clearance, (``BC1–BC3``, "clearance") of every pair of links.
     """
 
     margin: Any
@@ -179,7 +172,7 @@ def margins_at(mechanism: Mechanism, answers: Configurations) -> tuple[Floats, I
     poses, sides = np.require(answers.rows.poses, requirements=["C", "W"]), sides_at(model, answers)
     for row in range(len(answers)):
         here = slice(row, row + 1)
-        margin[here], binding[here] = _margins(model, poses[here], poses[here], sides[here])
+        margin[here], binding[here] = leg_margins(model, poses[here], poses[here], sides[here])
     return margin, binding
 
 
@@ -205,7 +198,7 @@ def _of_mode(model: Model, poses: Floats, start: Configurations | None) -> tuple
     mechanism, start_pose, sides = model.mechanism, model.mechanism.home_pose[None].copy(), model.legs.home_sides
     if start is not None:
         start_pose, sides = np.require(start.rows.poses, requirements=["C", "W"]), sides_at(model, start)
-    margin, binding = _margins(model, poses, start_pose, sides)
+    margin, binding = leg_margins(model, poses, start_pose, sides)
     if mechanism.clearance is not None:
         _lower_to_clearance(model, mechanism.clearance, poses, start, sides, margin, binding)
     return margin, binding
@@ -229,34 +222,3 @@ def _lower_to_clearance(
         room[~is_reached] = -np.inf
         lower = room < margin[rows]
         margin[rows[lower]], binding[rows[lower]] = room[lower], first_pair + pairs[lower]
-
-
-def _margins(model: Model, poses: Floats, start_pose: Floats, sides: Floats) -> tuple[Floats, Ints]:
-    """Margins (n,) of poses (n, 4, 4), and the indices of their limits: in blocks, then unsolved rows one by one."""
-    margin, binding = np.empty(len(poses)), np.empty(len(poses), np.int64)
-    table = model.legs
-    legs, unsolved = table_handle(table), np.arange(len(poses))
-    if table.is_for_blocks:
-        from .kernels.legs.margin_blocks import margins_in_blocks
-
-        follows = int(table.task["unset"][0] > 0 and has_parasitic_motion(model.path_closure))
-
-        def run(block: slice) -> int:
-            return margins_in_blocks(
-                legs.address, poses[block], start_pose, sides, follows, margin[block], binding[block]
-            )
-
-        if not sum(in_blocks(run, len(poses), ROWS_A_RUN)):
-            return margin, binding
-        unsolved = np.flatnonzero(binding == UNKNOWN)
-    from .kernels.legs.feasibility import feasibility as measure
-
-    unsolved_poses, margins, bindings = poses[unsolved], np.empty(len(unsolved)), np.empty(len(unsolved), np.int64)
-    nothing = np.empty((0, 0))
-
-    def run_unsolved(block: slice) -> None:
-        measure(legs.address, unsolved_poses[block], start_pose, sides, margins[block], bindings[block], nothing)
-
-    in_blocks(run_unsolved, len(unsolved), ROWS_A_BLOCK)
-    margin[unsolved], binding[unsolved] = margins, bindings
-    return margin, binding

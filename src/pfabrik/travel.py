@@ -9,7 +9,7 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .answers.active_limits import ActiveLimit, active_limits
+from .answers.active_limits import ActiveLimit, active_limits, dead_point
 from .answers.solution import Solution, checked_solution
 from .answers.status import Status
 from .answers.words import DEAD_POINT, NO_FREEDOM, STRETCHED, has_freedom, short_names
@@ -59,7 +59,7 @@ class Reach:
     distance : float
         Distance that the end effector can move [length or rad]; inf where nothing stops it.
     stopped_by : tuple of ActiveLimit
-        The limits that stop it; empty if the links are stretched out or nothing stops it.
+        The limits that stop it, or the dead point; empty if nothing stops it, or none of these.
     end : Solution or None
         The last configuration in this direction; None if nothing stops it.
     cause : str
@@ -78,7 +78,8 @@ class Reach:
     @property
     def why(self) -> str:
         """The cause of the stop in a few words, for a table; empty if nothing stops it."""
-        return IN_SHORT.get(self.cause, "the task") if self.cause else short_names(self.stopped_by)
+        by_limits = not self.cause or (self.cause == STRETCHED and self.stopped_by)
+        return short_names(self.stopped_by) if by_limits else IN_SHORT.get(self.cause, "the task")
 
 
 @dataclass(frozen=True, repr=False)
@@ -210,7 +211,11 @@ def travel(
         bounded = np.isfinite(distance)
         stop, end = (named[row], ends[row]) if bounded else ((), None)
         x, y, z = direction
-        cause = "" if end is None else _cause(end, bool(stop), *search.twist(row, end.pose))
+        cause = ""
+        if end is not None:
+            motion = search.twist(row, end.pose)
+            cause = _cause(end, bool(stop), *motion)
+            stop = dead_point(model_of(mechanism), end._configurations, [motion]) if cause == STRETCHED else stop
         reaches.append(Reach(kind, (x, y, z), distance, stop, end, cause))
     return Travel(solution, tuple(reaches))
 

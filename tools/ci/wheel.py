@@ -1,6 +1,7 @@
 """Build the sdist and the wheel, compare their files with what is tracked, and use the wheel in empty environments.
 
-    .venv/bin/python tools/ci/wheel.py
+    .venv/bin/python tools/ci/wheel.py          # builds both
+    python tools/ci/wheel.py FOLDER             # uses the wheel in a folder, built elsewhere
 
 The wheel is built from the sdist, so that what the sdist lacks is missed. It is installed outside the checkout, for
 each Python from 3.11 on that is found: the kernels are in it, as `tools/kernels/try_wheel.py` shows.
@@ -52,6 +53,10 @@ print(f"{len(pf.__all__)} public names, {len(pf.catalog())} machines, {len(templ
 def main() -> int:
     """Build, compare and use; 0 if all is as it should be."""
     with tempfile.TemporaryDirectory() as folder:
+        if len(sys.argv) > 1:
+            (wheel,) = Path(sys.argv[1]).resolve().glob("*.whl")
+            use(wheel, sys.executable, Path(folder))
+            return 0
         sdist, wheel = build(Path(folder))
         wrong = [*differences(sdist, wheel)]
         for fault in wrong:
@@ -108,8 +113,8 @@ def use(wheel: Path, python: str, folder: Path) -> None:
     """Install the wheel into an empty environment and do a few things with it there."""
     place = Path(tempfile.mkdtemp(dir=folder))
     run([python, "-m", "venv", str(place / "env")])
-    command = str(place / "env" / "bin" / "pfabrik")
-    own = str(place / "env" / "bin" / "python")
+    programs = place / "env" / ("Scripts" if os.name == "nt" else "bin")
+    command, own = str(programs / "pfabrik"), str(programs / "python")
     run([own, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", str(wheel)])
     run([command, "new", "hexapod", "-o", "machine.toml"], place)
     said = [

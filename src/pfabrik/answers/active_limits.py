@@ -4,24 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..common.arrays import Floats
+from ..common.rotations import from_rotvec
+from ..engines.joints.configurations import Configurations
 from ..engines.joints.first_order import are_stretched
 from ..engines.joints.link_distances import pair_distances_at, pair_names
+from ..engines.pose.answers import sides_at
+from ..engines.pose.leg_margins import leg_margins
+from ..engines.pose.tip_engine import measured, start_at_tip
+from ..machine.decomposition.leg_table import DEAD_POINTS
 from ..machine.description.mechanism import Mechanism
 from ..machine.model import Model
-from ..machine.motion.displacements import rate_units
+from ..machine.motion.displacements import columns, rate_units
 from ..machine.motion.limited_coordinates import coned, ranges_of
 from ..machine.motion.loops import cycle_basis, first_order, right_singular
 from ..machine.motion.mobility import generic_of
 from ..tolerances import TOLERANCES
 
-Bound: TypeAlias = Literal["min", "max", "cone", "clearance", "stretched"]
-"""A limit of a joint, the clearance of two links, or links that are stretched out or folded at a joint."""
+Bound: TypeAlias = Literal["min", "max", "cone", "clearance", "stretched", "level"]
+"""A limit of a joint, the clearance of two links, or a dead point: links are stretched out or folded at a joint, or a
+rod is level, square to its upright slide."""
+
+JUST_BEYOND = 1e-5
+"""How far beyond a border poses are by which legs tell the dead point that they meet there [L or rad]."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +43,8 @@ class ActiveLimit:
     joint, bound : str
         The limit and its joint; for a clearance the two bodies that are as near: ``BC1–BC3``.
     value, limit : float
-        The coordinate (or the angle at the cone, or the distance of the links) and its bound, of links that are
-        stretched the coordinate itself [length or rad].
+        The coordinate (or the angle at the cone, or the distance of the links) and its bound, of a dead point the
+        coordinate itself [length or rad].
     coordinate : int
         Which coordinate of the joint, as in `home_coordinate`: 0, or 1 for the second of a universal or cylindrical
         joint.
@@ -123,6 +133,32 @@ def holding_limits(mechanism: Mechanism, coordinates: Floats, multipliers: Float
         multiplier = float(multipliers[row, place]) * unit
         limits[row].append(ActiveLimit(name, bound, value, limit, multiplier, coordinate_place))
     return [tuple(row_limits) for row_limits in limits]
+
+
+def dead_point(model: Model, at: Configurations, motions: Sequence[tuple[Floats, Floats]]) -> tuple[ActiveLimit, ...]:
+    """The dead point at a configuration: of the leg that does not reach just beyond it, else as of `stretched_joint`.
+
+    Parameters
+    ----------
+    motions : velocities of the reference point [L] and angular ones that lead beyond, the first that tells counts.
+    """
+    read = measured(model)
+    legs_at = at if read is model else cast(Configurations, start_at_tip(at))
+    for velocity, turn in motions if read.has_legs and not read.why_poses_do_not_suffice else ():
+        size = float(np.abs([velocity, turn]).max())
+        if size == 0.0:
+            continue
+        pose, step = np.require(legs_at.rows.poses, requirements=["C", "W"]).copy(), JUST_BEYOND / size
+        beyond = pose.copy()
+        beyond[0, :3, :3] = from_rotvec(step * turn) @ pose[0, :3, :3]
+        beyond[0, :3, 3] += model.length * (step * velocity)
+        margin, binding = leg_margins(read, beyond, pose, sides_at(read, legs_at))
+        joint, bound = read.legs.measured_limits[int(binding[0])] if margin[0] < 0.0 else ("", "")
+        if bound in DEAD_POINTS:
+            (value, *_) = np.atleast_1d(at.coordinates[0, columns(model.mechanism)[joint]]).tolist()
+            (home, *_) = np.atleast_1d(model.mechanism.home_coordinate(joint)).tolist()
+            return (ActiveLimit(joint, cast(Bound, bound), value + home, value + home),)
+    return stretched_joint(model, at.coordinates)
 
 
 def stretched_joint(model: Model, q: Floats) -> tuple[ActiveLimit, ...]:

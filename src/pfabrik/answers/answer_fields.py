@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..common.arrays import Floats, Ints, Mask, shaped
 from ..common.batch import aligned
 from ..common.frozen import FrozenMapping
+from ..common.rotations import to_rotvec
 from ..engines.engine import engine_of
 from ..engines.joints.configurations import Configurations
 from ..engines.joints.projection import modes_of
@@ -34,9 +35,9 @@ from .active_limits import (
     ActiveLimit,
     active_limits,
     binding_limits,
+    dead_point,
     has_passive_limits,
     holding_limits,
-    stretched_joint,
 )
 from .jumps import are_jumps
 from .status import Status
@@ -230,8 +231,19 @@ class Answer:
                 limits[row] = row_limits
         model = model_of(self.mechanism)
         for place in np.flatnonzero(status == Status.PROJECTED).tolist():
-            limits[place] = limits[place] or stretched_joint(model, self._coordinates_at(place))
+            limits[place] = limits[place] or dead_point(
+                model, self._configurations.at(np.array([place])), self._missed(place)
+            )
         return limits
+
+    def _missed(self, place: int) -> list[tuple[Floats, Floats]]:
+        """The motions to a row's target: velocity of the reference point [L] and angular one, then each alone."""
+        if self._request is None:
+            return []
+        pose, target = self._rows.poses[place], self._request.targets[place]
+        offset = (target - pose)[:3, 3] / self.mechanism.characteristic_length
+        turn = to_rotvec(target[:3, :3] @ pose[:3, :3].T)
+        return [(offset, turn), (offset, 0.0 * turn), (0.0 * offset, turn)]
 
     @cached_property
     def binding(self) -> NDArray[np.void]:

@@ -29,6 +29,7 @@ from .jumps import are_jumps
 from .pace import Pace
 from .solution import Solution
 from .status import Status
+from .words import error_words
 
 MOST_NAMED = 5
 """Targets that a summary names by number, at most."""
@@ -266,7 +267,7 @@ class TrackSummary:
         self._mechanism = mechanism
         self._counts: Counter[Status] = Counter()
         self._n_targets = 0
-        self._farthest = 0.0
+        self._farthest = [0.0, 0.0]
         self._failed, self._jumps, self._near = TargetNumbers(), TargetNumbers(), TargetNumbers()
         self._first_off = ""
         self._nearest = math.inf
@@ -285,7 +286,8 @@ class TrackSummary:
         off = np.flatnonzero(status != Status.REACHED)
         if len(off) and not self._first_off:
             self._first_off = place_of(begin, int(off[0]), lines)
-        self._farthest = max(self._farthest, float(track.position_error[new].max()))
+        errors = (track.position_error[new], track.rotation_error[new])
+        self._farthest = [max(before, float(each.max())) for before, each in zip(self._farthest, errors, strict=True)]
         self._failed.add((begin + np.flatnonzero(status >= Status.FAILED)).tolist())
         self._jumps.add((begin + np.flatnonzero(track.jumps[new])).tolist())
         if track.passing is not None:
@@ -320,8 +322,8 @@ class TrackSummary:
         if self._failed.count:
             parts.append(f"failed at {self._failed}")
         if counts[Status.PROJECTED]:
-            farthest = f"farthest from its target {self._farthest:.3g} {self._mechanism.length_unit}"
-            parts.append(f"first at {self._first_off}; {farthest}")
+            farthest = error_words(self._mechanism, *self._farthest)
+            parts.append(f"first at {self._first_off}; farthest from its target {farthest}")
         if self._jumps.count:
             parts.append(f"{counted(self._jumps.count, 'jump')} ({self._jumps})")
         if self._near.count:

@@ -13,13 +13,14 @@ from ..common.printed import ResultTable, error_text, plain
 from ..common.rotations import to_rotvec, to_rpy
 from ..engines.joints.assemble import is_over_determined
 from ..engines.joints.first_order import is_at_dead_point
+from ..machine.decomposition.leg_table import DEAD_POINTS
 from ..machine.description.joints import KINDS
 from ..machine.description.mechanism_table import bound_text
 from ..machine.description.readouts import Readout, readouts
 from ..machine.description.sketch import sketch
 from ..machine.description.task import task_of
 from ..machine.model import model_of
-from ..machine.motion.fitting_task import has_dependent_coordinates, motions_at, task_remark, tilt_axis
+from ..machine.motion.fitting_task import has_dependent_coordinates, motions_at, task_remark, tilt_axis, what_follows
 from ..tolerances import TOLERANCES
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def causes(answer: Answer) -> list[str]:
     limits = answer._limits[0]
     if not limits:
         return [f"no limit is active: {why_without_limits(answer)}"]
-    blocks_all = limits[0].bound != "stretched" or why_without_limits(answer) != NO_FREEDOM
+    blocks_all = limits[0].bound not in DEAD_POINTS or why_without_limits(answer) != NO_FREEDOM
     return reasons(answer) if blocks_all else [*reasons(answer), NO_FREEDOM]
 
 
@@ -133,12 +134,16 @@ def what_is_wrong(answer: Answer) -> str:
 
 def distance(answer: Answer) -> str:
     """Those of position error and rotation error that exceed the tolerance, with units."""
-    mechanism = answer.mechanism
+    return error_words(answer.mechanism, float(answer.position_error), float(answer.rotation_error))
+
+
+def error_words(mechanism: Mechanism, position: float, rotation: float) -> str:
+    """Those of two errors [length], [rad] that exceed the tolerance, each with its unit: ``12.3 mm and 4 deg``."""
     parts = []
-    if answer.position_error > TOLERANCES.position * mechanism.characteristic_length:
-        parts.append(f"{float(answer.position_error):.3g} {mechanism.length_unit}")
-    if answer.rotation_error > TOLERANCES.rotation:
-        parts.append(f"{math.degrees(float(answer.rotation_error)):.3g} deg")
+    if position > TOLERANCES.position * mechanism.characteristic_length:
+        parts.append(f"{position:.3g} {mechanism.length_unit}")
+    if rotation > TOLERANCES.rotation:
+        parts.append(f"{math.degrees(rotation):.3g} deg")
     return " and ".join(parts) or "a hair"
 
 
@@ -172,7 +177,7 @@ def in_words(limit: ActiveLimit, mechanism: Mechanism) -> tuple[str, str]:
     if limit.bound == "clearance":
         return "", f"clearance {limit.limit:.6g} {mechanism.length_unit}"
     joint = mechanism.joint(limit.joint)
-    if limit.bound == "stretched":
+    if limit.bound in DEAD_POINTS:
         return "", limit.bound
     noun = "joint" if joint.type != "prismatic" else "strut" if joint.along else "slider"
     angle = math.degrees(limit.limit)
@@ -200,6 +205,9 @@ def as_phrase(noun: str, joints: Sequence[str], bound: str) -> str:
     """
     if bound == "stretched":
         return f"{STRETCHED} at joint{'s' * (len(joints) > 1)} {', '.join(joints)}"
+    if bound == "level":
+        rod = "the rods at {} are" if len(joints) > 1 else "the rod at {} is"
+        return f"{rod.format(', '.join(joints))} level, and {'reach' if len(joints) > 1 else 'reaches'} no farther"
     if bound.startswith("clearance"):
         return f"{', '.join(joints)} at their {bound}"
     subject = f"{noun}{'s' * (len(joints) > 1)} {', '.join(joints)}"
@@ -216,12 +224,16 @@ def short_names(limits: Iterable[ActiveLimit]) -> str:
 
 
 def limit_name(joint: str, bound: str) -> str:
-    """The limit of a joint, or of two bodies, for a cell of a table: ``B3 max``, ``BC1–BC3 clearance``."""
-    return f"{joint} {bound}".strip()
+    """The limit of a joint, or of two bodies, for a cell of a table: ``B3 max``, ``BC1–BC3 clearance``.
+
+    Every border has this name, whichever verb meets it; ``links stretched`` where no joint tells.
+    """
+    return f"{joint or 'links'} {bound}"
 
 
 BOUND_NOTES = {
-    "reach": "reach: a rod is stretched out or folded, and does not reach farther",
+    "stretched": "stretched: the links of this joint are in line, or square to a slide, and reach no farther",
+    "level": "level: the rod of this joint is square to its slide, and reaches no farther",
     "not closed": "not closed: the hinges and rods of a leg do not come together beyond",
 }
 """Bounds that are no limits of a joint, explained."""
@@ -276,9 +288,9 @@ def _pose(answer: Answer) -> list[str]:
         ("x y z", "   ".join(position), answer.mechanism.length_unit),
         ("roll pitch yaw", "   ".join(angles), "deg"),
     ]
-    width = max(len(text) for _, text, _ in rows)
+    width, left_open = max(len(text) for _, text, _ in rows), what_follows(answer.mechanism)
     lines = [f"{name:<16}{text:<{width}}   [{unit}]" for name, text, unit in rows]
-    return [*lines, f"{'loops closed to':<16}{loop_gap(answer)}"]
+    return [*lines, f"{'loops closed to':<16}{loop_gap(answer)}", *([left_open] if left_open else [])]
 
 
 def pose_texts(answer: Answer) -> tuple[list[str], list[str]]:

@@ -96,7 +96,6 @@ def calibrate(
             file.write(text)
     if plot is not None:
         write_picture(plot, partial(pf.plot_calibration, result))
-        click.echo(f"wrote {plot}", err=True)
     print_result(as_json, result)
     if held:
         note(

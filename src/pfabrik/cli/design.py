@@ -103,7 +103,6 @@ def design(
             file.write(dumps(best.mechanism))
     if plot is not None and best.rounds:
         write_picture(plot, best.plot)
-        click.echo(f"wrote {plot}", err=True)
     print_result(as_json, result)
     for path, is_there in ((output, best.mechanism), (plot, best.rounds)):
         if path is not None and not is_there:

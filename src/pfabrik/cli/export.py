@@ -13,7 +13,7 @@ import pfabrik as pf
 
 from .arguments import MECH, comma_separated, load, named_joints
 from .options import joints_option
-from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
+from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, say_wrote, whole_file
 from .printing import note
 
 FIRMWARES = ("klipper", "reprap", "marlin")
@@ -53,9 +53,9 @@ def text_of(
 
         return exported_page(mechanism)
     if form in BACKENDS:
-        from ..exchange.export.tensors import TASK, tensor_source
+        from ..exchange.export.tensors import tensor_source
 
-        return tensor_source(mechanism, backend=cast(Any, form), joints=joints or TASK)
+        return tensor_source(mechanism, backend=cast(Any, form), joints=joints or None)
     from ..exchange.export.export_c import c_source
 
     chosen, precision = cast(Any, parts or None), cast(Any, "float" if form == "c-float" else "double")
@@ -184,8 +184,6 @@ def _check_settings(forms: Sequence[str], name: str | None, joints: tuple[str, .
 def _write(path: Path, form: str, text: str) -> None:
     with whole_file(path) as handle:
         handle.write(text)
-    if path != STANDARD:
-        click.echo(f"wrote {path}", err=True)
     if form == "linuxcnc" and text.startswith("/*"):
         note("LinuxCNC has no kinematics that are this machine's: a module for it")
 
@@ -196,4 +194,4 @@ def _write_package(folder: Path, texts: dict[str, str], force: bool) -> None:
     for place in texts:
         refuse_existing(folder / place, force)
     write_package(folder, texts)
-    click.echo(f"wrote {folder}: {', '.join(texts)}", err=True)
+    say_wrote(folder, f": {', '.join(texts)}")

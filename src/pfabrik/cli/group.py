@@ -58,6 +58,7 @@ class CommandGroup(click.Group):
         name = f"{cmd_name}_" if keyword.iskeyword(cmd_name) else cmd_name
         module = importlib.import_module(f".{self._modules[cmd_name]}", __package__)
         command: click.Command = getattr(module, name)
+        refuse_repeated_files(command)
         command.epilog = "\n".join(["\b", "Examples:", *(f"  pfabrik {line}" for line in EXAMPLES[cmd_name])])
         return command
 
@@ -107,6 +108,22 @@ class CommandGroup(click.Group):
                 return run()
             take_closed_places()
             return leave(exit_code(run))
+
+
+def refuse_repeated_files(command: click.Command) -> None:
+    """Refuse an option of one file that is given twice: the last would be taken, and the others dropped in silence."""
+    parse = command.parse_args
+
+    def parse_args(context: click.Context, args: list[str]) -> list[str]:
+        parser = command.make_parser(context)
+        parser.ignore_unknown_options, given = True, parser.parse_args(args=[*args])[2]
+        for each in {each.name: each for each in given if isinstance(each.type, click.Path)}.values():
+            count = sum(other is each for other in given)
+            if isinstance(each, click.Option) and not each.multiple and count > 1:
+                raise click.UsageError(f"{each.opts[0]}: found it {count} times; expected one file", context)
+        return parse(context, args)
+
+    command.parse_args = parse_args  # type: ignore[assignment,method-assign]
 
 
 def take_closed_places() -> None:

@@ -83,13 +83,10 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any
         print_json(as_object(model, text))
         if output == STANDARD:
             return 0
-    with whole_file(output) as handle:
+    for remark in () if as_json else model.notes:
+        note(str(remark))
+    with whole_file(output, f"; next: pfabrik info {output}") as handle:
         handle.write(text)
-    if not as_json:
-        for remark in model.notes:
-            note(str(remark))
-        if output != STANDARD:
-            click.echo(f"wrote {output}; next: pfabrik info {output}", err=True)
     return 0
 
 

@@ -25,7 +25,14 @@ from .printing import json_option, note, print_answer, print_json, print_text, p
 if TYPE_CHECKING:
     from ..view.overview import Overview
 
-ALIASES = {"hexapod": "6-UPS", "five-bar": "5-bar", "servo-hexapod": "6-RUS", "hexaglide": "6-PUS", "tripod": "3-RPS"}
+ALIASES = {
+    "hexapod": "6-UPS",
+    "five-bar": "5-bar",
+    "servo-hexapod": "6-RUS",
+    "hexaglide": "6-PUS",
+    "tripod": "3-RPS",
+    "agile-eye": "spherical-3rrr",
+}
 """Other names of kinds."""
 
 
@@ -96,10 +103,8 @@ def new(
     text = with_dimensions(text, ctx.args)
     refuse_existing(output, force)
     check_outputs([("-o", output)])
-    with whole_file(output) as handle:
+    with whole_file(output, f"; next: edit it, then pfabrik check {output}") as handle:
         handle.write(text)
-    if output != STANDARD:
-        click.echo(f"wrote {output}; next: edit it, then pfabrik check {output}")
     return 0
 
 

@@ -77,7 +77,6 @@ def effort(
             found.write(handle)
     if plot is not None:
         write_picture(plot, found.plot)
-        click.echo(f"wrote {plot}", err=True)
     print_result(as_json, found, to_stderr=output == STANDARD)
     return int(any(found.reason))
 

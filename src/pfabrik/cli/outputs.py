@@ -126,12 +126,21 @@ def real(path: Path) -> Path:
     return Path(os.path.realpath(path))
 
 
+def say_wrote(path: Path, more: str = "") -> None:
+    """Say on stderr which file was written, and what comes next or is in it."""
+    click.echo(f"wrote {path}{more}", err=True)
+
+
 @contextmanager
-def whole_file(path: Path) -> Iterator[TextIO]:
-    """A text file for writing that takes the name `path` only when the block ends without an error.
+def whole_file(path: Path, more: str = "") -> Iterator[TextIO]:
+    """A text file for writing that takes the name `path` only when the block ends without an error, and then says so.
 
     It is opened at once, so an unwritable place is found before the work begins. A device or pipe, and standard output
     for ``-``, is written directly.
+
+    Parameters
+    ----------
+    more : as of `say_wrote`.
     """
     if path == STANDARD:
         yield sys.stdout
@@ -143,6 +152,7 @@ def whole_file(path: Path) -> Iterator[TextIO]:
         return
     with whole_path(path) as part, part.open("x", newline="", encoding="utf-8") as handle:
         yield handle
+    say_wrote(path, more)
 
 
 @contextmanager
@@ -256,7 +266,7 @@ def note_no_picture(*without: str) -> None:
 def write_picture(
     path: Path, draw: Callable[[], Axes | Figure | Mapping[str, Axes]], drawn: PictureOptions | None = None
 ) -> None:
-    """Write to a file the figure that a function draws and returns, or of which it returns the axes.
+    """Write to a file the figure that a function draws and returns, or of which it returns the axes, and say so.
 
     It is cropped to what is drawn, unless a size is asked for.
     """
@@ -276,3 +286,4 @@ def write_picture(
         save_picture(figure, path, tight=drawn.size is None, dpi=drawn.dpi)
     finally:
         pyplot.close(figure)
+    say_wrote(path)

@@ -173,7 +173,6 @@ def travel(
         note_no_picture("--plot")
     else:
         write_picture(path, partial(pf.plot_travel, distances, **drawn.looks), drawn)
-        click.echo(f"wrote {path}", err=True)
     print_result(as_json, distances)
     return 0
 

@@ -7,12 +7,13 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ..capabilities.dynamics.weights import lacking_masses, moving_bodies
 from ..exchange.export.rod_lengths import odd_rods, uneven_rods, with_lengths
 from ..machine.description.graph import leaves, next_joints, steps_from_base
 from ..machine.description.home_mobility import ends_of_default_axes, universal_axes
 from ..machine.description.mechanism import Joint, Mechanism
 from ..machine.description.symmetry import crossed_rounds, near_copies
-from ..machine.motion.fitting_task import has_weak_coordinates, task_remark
+from ..machine.motion.fitting_task import has_weak_coordinates, task_hint, task_remark
 from ..view.overview import NOT_COUNTED, counted_mobility, nearly_free, vector
 
 FULL_TURN = 2.0 * math.pi
@@ -26,9 +27,12 @@ def remarks_on(mechanism: Mechanism) -> Iterator[str]:
     else:
         if has_weak_coordinates(mechanism):
             yield f"{task_remark(mechanism)}; hardly any target can be reached"
+        elif hint := task_hint(mechanism):
+            yield hint
         yield from (f"the loops hardly resist a motion of {nearly_free(motion)}" for motion in mobility.nearly_free)
     for _, joint, body in leaves(mechanism):
         yield f"nothing but joint '{joint.name}' connects '{body}', which so plays no part in where the end effector is"
+    yield from mass_notes(mechanism)
     yield from axes_notes(mechanism)
     yield from rod_notes(mechanism)
     yield from symmetry_notes(mechanism)
@@ -37,6 +41,16 @@ def remarks_on(mechanism: Mechanism) -> Iterator[str]:
         yield f"a range of {widest:.4g} rad is {widest / FULL_TURN:.3g} turns; were degrees meant?"
     if mechanism.angle_unit == "deg" and widest < math.radians(FULL_TURN):
         yield f"no range of an angle is wider than {math.degrees(widest):.3g} degrees; were radians meant?"
+
+
+def mass_notes(mechanism: Mechanism) -> Iterator[str]:
+    """The remark on bodies without a mass beside others that have one."""
+    lacking = lacking_masses(mechanism)
+    if 0 < len(lacking) < len(moving_bodies(mechanism)):
+        yield (
+            f"without a mass, while other bodies have one: {quoted(lacking)}; `mass = 0` says of a body that it weighs "
+            "nothing"
+        )
 
 
 def axes_notes(mechanism: Mechanism) -> Iterator[str]:

@@ -14,7 +14,7 @@ import pfabrik as pf
 
 from .arguments import FINITE, MECH, TargetOptions, load, named_joints, targeted
 from .options import STANDARD_INPUT, joints_option, together
-from .outputs import PictureOptions, check_outputs, pictured, require_format, write_picture
+from .outputs import PictureOptions, check_outputs, pictured, require_format, say_wrote, write_picture
 from .printing import note
 
 
@@ -87,11 +87,9 @@ def plot(
         if drawn.view is not None or drawn.theme != "light":
             raise click.UsageError("--torque-map is no picture of a machine: it does not go with --view or --theme")
         write_picture(path, partial(torque_map.draw, mechanism), drawn)
-        click.echo(f"wrote {path}")
         return 0
     shown = pf.solve_ik(mechanism, target.of(mechanism)) if target.is_given else mechanism
     write_picture(path, partial(pf.plot, shown, names=names, **drawn.in_space), drawn)
-    click.echo(f"wrote {path}")
     return 0 if shown else 1
 
 
@@ -121,7 +119,7 @@ def view(mech: str, path: Path | None, port: int, host: str, no_browser: bool, h
     with pf.view(shown, port=port, host=host) as viewer:
         if html is not None:
             viewer.save(html)
-            click.echo(f"wrote {html}")
+            say_wrote(html)
             return 0
         if viewer.port != port:
             note(f"port {port} is taken: served at {viewer.port} instead")

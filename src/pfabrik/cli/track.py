@@ -26,6 +26,7 @@ from .outputs import (
     pictured,
     refuse_both_on_stdout,
     require_picture,
+    say_wrote,
     whole_file,
     write_picture,
 )
@@ -263,10 +264,9 @@ def draw(solution: pf.Track, picture_path: Path | None, film_path: Path | None, 
     """Write the picture and the film that are wanted."""
     if picture_path is not None:
         write_picture(picture_path, partial(pf.plot_track, solution, **drawn.in_space), drawn)
-        click.echo(f"wrote {picture_path}", err=True)
     if film_path is not None:
         pf.animate(solution, film_path, dpi=drawn.dpi, **drawn.in_space)
-        click.echo(f"wrote {film_path}", err=True)
+        say_wrote(film_path)
 
 
 def _limits_of(

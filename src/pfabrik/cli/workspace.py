@@ -24,6 +24,7 @@ from .outputs import (
     pictured,
     require_format,
     require_picture,
+    say_wrote,
     write_picture,
 )
 from .printing import json_option, note, print_result
@@ -157,7 +158,7 @@ def workspace(
             write_picture(path, partial(found.plot, shape=shape, **drawn.in_space), drawn)
         else:
             found.save(path)
-        click.echo(f"wrote {path}", err=True)
+            say_wrote(path)
     print_result(as_json, found, {} if shape is None else {"largest": shape})
     return 0 if len(found.faces) else 1
 
@@ -195,7 +196,6 @@ def singularities(
     found = pf.singularity_map(mechanism, space.workspace(mech, mechanism, target.rpy))
     if output is not None:
         write_picture(output, partial(found.plot, **drawn.in_space), drawn)
-        click.echo(f"wrote {output}", err=True)
     print_result(as_json, found)
     return 0 if len(found.points) else 1
 

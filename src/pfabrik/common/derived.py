@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar, cast
 
 Owner = TypeVar("Owner")
 P = ParamSpec("P")
@@ -12,6 +12,10 @@ Value = TypeVar("Value")
 
 MOST = 256
 """Most values of one function with other arguments that an object keeps: options may vary from call to call."""
+
+
+MISSING = object()
+"""What an object keeps that is not computed yet: no value, which may be None."""
 
 
 def derived(function: Callable[Concatenate[Owner, P], Value]) -> Callable[Concatenate[Owner, P], Value]:
@@ -28,10 +32,10 @@ def derived(function: Callable[Concatenate[Owner, P], Value]) -> Callable[Concat
         if args or kwargs:
             values = owner.__dict__.setdefault(name, {})
             key = args, *kwargs.items()
-        try:
-            return values[key]
-        except KeyError:
-            value = function(owner, *args, **kwargs)
+        found = values.get(key, MISSING)
+        if found is not MISSING:
+            return cast(Value, found)
+        value = function(owner, *args, **kwargs)
         if len(values) >= MOST and key is not name:
             values.clear()
         values[key] = value

@@ -11,6 +11,7 @@ from ..answers.margins import margins
 from ..answers.solution import Solution
 from ..answers.status import Status
 from ..answers.tracked import Track
+from ..answers.words import error_words
 from ..common.arrays import Floats, Mask
 from ..common.checks import require_method, require_type
 from ..common.drawing import SMALL, Theme, View, dotted_where_alone, new_figure
@@ -120,10 +121,11 @@ def checked_track(track: Track) -> NDArray[np.intp]:
 
 
 def reached_in_words(solution: Solution) -> str:
-    """The number of steps reached, and the largest distance of the others from their targets."""
+    """The number of steps reached, and the largest distances of the others from their targets, lengths and angles."""
     n_unreached = int((np.asarray(solution.status) != Status.REACHED).sum())
     reached = f"{len(solution) - n_unreached} of {counted(len(solution), 'step')} reached"
-    farthest = f"{float(np.nanmax(solution.position_error)):.3g} {solution.mechanism.length_unit}"
+    position, rotation = (float(np.nanmax(each)) for each in (solution.position_error, solution.rotation_error))
+    farthest = error_words(solution.mechanism, position, rotation)
     return f"{reached}, the others at most {farthest} from their targets" if n_unreached else reached
 
 

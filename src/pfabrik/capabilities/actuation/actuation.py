@@ -59,8 +59,8 @@ class LimitMargin(NamedTuple):
         As in `margins` a share of the range: 1 in the middle, 0 on a limit, negative beyond it or where loops do not
         close. Near a dead point, how near it is, as in `Singularity.serial`. inf where nothing limits.
     joint, bound : str or array of str (...)
-        The limit: "min", "max", "cone"; "reach" or "not closed" where a leg does not reach; "dead point" of a motor;
-        "singularity", of no joint, where actuators lose their hold.
+        The limit: "min", "max", "cone"; "stretched", "level" or "not closed" where a leg does not reach; "dead point"
+        of a motor; "singularity", of no joint, where actuators lose their hold.
     """
 
     margin: float | Floats

@@ -17,6 +17,7 @@ from ...common.arrays import Floats, Mask
 from ...errors import InvalidArgument, InvalidMechanism, MobilityWarning, UnsupportedMechanism
 from ...ik import solve_ik
 from ...kinematics import MachineAt, VariedMachine, generic_of, task_of
+from ...machine.decomposition.leg_table import DEAD_POINTS
 from ...machine.description.joints import set_fields
 from ...machine.description.mechanism import Mechanism
 from ...tolerances import TOLERANCES
@@ -56,7 +57,7 @@ class Dimensions:
         drive_of = {drive.joint.name: place for place, drive in enumerate(mechanism.drives)}
         limits = [(row, drive_of.get(joint), bound) for row, (joint, bound) in enumerate(self.limits)]
         of_drives = [(row, drive, bound) for row, drive, bound in limits if drive is not None]
-        self.reaching = [(row, drive) for row, drive, bound in of_drives if bound == "reach"]
+        self.reaching = [(row, drive) for row, drive, _ in of_drives if row in varied.reach_rows]
         self.ends = [(row, drive, bound == "min") for row, drive, bound in of_drives if bound in ("min", "max")]
         self.is_length = np.array([drive.kind == "length" for drive in mechanism.drives])
         self.own_machine = varied.at(self.own)
@@ -259,7 +260,9 @@ class Candidate:
     @cached_property
     def _closed(self) -> tuple[Mask, Solution | None]:
         """Where legs close, (n,), and the configurations there, without limits; none of what cannot be built."""
-        closing = [row for row, (_, bound) in enumerate(self.dimensions.limits) if bound in ("reach", "not closed")]
+        closing = [
+            row for row, (_, bound) in enumerate(self.dimensions.limits) if bound in (*DEAD_POINTS, "not closed")
+        ]
         closed = np.asarray(np.isposinf(self._found.margins(self.poses)[:, closing]).all(axis=1))
         try:
             return closed, solve_ik(self.unlimited, self.poses[closed]) if closed.any() else None

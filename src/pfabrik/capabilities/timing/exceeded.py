@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Floats, Ints
+from ...common.arrays import Floats, Ints, Mask
 from .curve import Curve
 from .timed import EXCEEDED, Exceeded, What
 from .torque_path import TorquePath
@@ -137,6 +137,13 @@ def with_exact_torques(curve: Curve, timing: Timing, limits: Limits) -> Limits:
     return limits._replace(path=path)
 
 
+def cells_over(curve: Curve, timing: Timing, limits: Limits) -> Mask:
+    """True for the cells of the grid between whose ends a limit is exceeded by more than half of what is told."""
+    blocks = np.array_split(np.arange(len(timing.durations)), -(-len(timing.durations) // CELLS_A_BLOCK))
+    over = [_used(curve, timing, limits, cells, LOOKS) > 1.0 + 0.5 * EXCEEDED for cells in blocks]
+    return np.concatenate([each.any(axis=(1, 2)) for each in over])
+
+
 def exceeded(curve: Curve, timing: Timing, limits: Limits, actuators: tuple[str, ...]) -> tuple[Exceeded, ...]:
     """The limits that a motion exceeds, anywhere, the most first."""
     named = limits.named(actuators)
@@ -145,12 +152,8 @@ def exceeded(curve: Curve, timing: Timing, limits: Limits, actuators: tuple[str,
     signs = np.sign(curve.at(timing.s, 1)[:, : curve.n_actuators])
     rubs = False if limits.path is None else limits.path.rubs
     turns_back = ((signs[1:] != signs[:-1]) & rubs).any(axis=1)
-    for first in range(0, len(turns_back), CELLS_A_BLOCK):
-        cells = np.arange(first, min(first + CELLS_A_BLOCK, len(turns_back)))
-        is_over = (_used(curve, timing, limits, cells, LOOKS) > 1.0 + 0.5 * EXCEEDED).any(axis=(1, 2))
-        cells = cells[is_over | turns_back[cells]]
-        if not len(cells):
-            continue
+    looked_at = np.flatnonzero(cells_over(curve, timing, limits) | turns_back)
+    for cells in np.split(looked_at, range(CELLS_A_BLOCK, len(looked_at), CELLS_A_BLOCK)) if len(looked_at) else ():
         used = _used(curve, timing, limits, cells, CLOSER_LOOKS)
         durations += (used > 1.0 + EXCEEDED).mean(axis=1).T @ timing.durations[cells]
         for place in np.flatnonzero(used.max(axis=(0, 1)) > 1.0 + 0.5 * EXCEEDED).tolist():

@@ -22,7 +22,7 @@ from ..dynamics.weights import lacking_masses, weights_of
 from ..statics.forces import GRAVITY
 from ..statics.loads import BodyLoads, checked_gravity
 from .curve import Curve, curve_of, refuse_crossings
-from .exceeded import Limits, Timing, exceeded, motion_at, with_exact_torques
+from .exceeded import Limits, Timing, cells_over, exceeded, motion_at, with_exact_torques
 from .pauses import pieces_of, with_pauses
 from .timed import Timed
 from .torque_path import TorqueParts, TorquePath, TorqueSource
@@ -31,6 +31,10 @@ MOST_SAMPLES = 10_000_000
 
 TORQUE_PLACES = 400
 """Places of a path, at least, between which torques are a spline."""
+
+REFINEMENTS = 12
+"""Largest number of times that the grid is refined where torques exceed their limits between its points; usually six
+suffice for a path of minutes."""
 
 ROUNDS = 8
 """Largest number of passes that slow down cells of the grid in which an acceleration exceeds its limit; usually three
@@ -114,8 +118,8 @@ def time_path(
             continue
         refuse_swings(track, curve)
         limits = Limits(speeds, accelerations, most_platform, torques, _torques(track, curve, torques, loads, gravity))
-        timing = _fastest(curve, limits)
-        parts.append((pause, _sampled(track, curve, timing, with_exact_torques(curve, timing, limits), every)))
+        timing, limits = _fastest(curve, limits)
+        parts.append((pause, _sampled(track, curve, timing, limits, every)))
         pause = 0.0
     if not parts:
         raise InvalidArgument("track", "a path that does not move", "two steps or more that differ")
@@ -159,9 +163,24 @@ def refuse_swings(track: Track, curve: Curve) -> None:
         raise InvalidArgument("track", found, "shorter steps, or some room before that limit", rows=steps)
 
 
-def _fastest(curve: Curve, limits: Limits) -> Timing:
-    """The largest squared speeds on a grid along s."""
+def _fastest(curve: Curve, limits: Limits) -> tuple[Timing, Limits]:
+    """The fastest timing on a grid that is as fine as torques need it, and its limits, exact where it is."""
     s = curve.grid()
+    timing = _fastest_on(s, curve, limits)
+    if limits.path is not None:
+        limits = with_exact_torques(curve, timing, limits)
+    for _ in range(REFINEMENTS if limits.path is not None else 0):
+        over = cells_over(curve, timing, limits)
+        if not over.any():
+            break
+        over[1:-1] |= over[2:] | over[:-2]
+        s = np.sort(np.append(s, 0.5 * (s[1:] + s[:-1])[over]))
+        timing = _fastest_on(s, curve, limits)
+    return timing, limits
+
+
+def _fastest_on(s: Floats, curve: Curve, limits: Limits) -> Timing:
+    """The largest squared speeds on a grid s."""
     slopes, bends = curve.at(s, 1), curve.at(s, 2)
     n, shares = curve.n_actuators, np.empty(len(s) - 1)
     speed_shares(s, slopes, bends, limits.speeds, limits.platform, shares)
@@ -172,7 +191,8 @@ def _fastest(curve: Curve, limits: Limits) -> Timing:
     by_push, by_speed, most = slopes, bends, np.tile(limits.accelerations, (len(s), 1))
     rest = viscous = np.zeros(most.shape)
     if limits.path is not None:
-        parts, limited = limits.path.at(s, slopes[:, :n], bends[:, :n]), np.isfinite(limits.accelerations).nonzero()[0]
+        parts = limits.path.at_either_sign(s, slopes[:, :n], bends[:, :n])
+        limited = np.isfinite(limits.accelerations).nonzero()[0]
         by_push, by_speed = _beside(slopes[:, limited], parts.by_push), _beside(bends[:, limited], parts.by_speed)
         rest, viscous = _beside(rest[:, limited], parts.rest), _beside(viscous[:, limited], parts.viscous)
         most = _beside(most[:, limited], parts.most)

@@ -144,6 +144,23 @@ class TorquePath:
         own = TorqueParts(by_push, by_speed + more, slopes * (viscous * drives.si), rest, most)
         return self._together(own, minors) if self._motions else own
 
+    def at_either_sign(self, s: Floats, slopes: Floats, bends: Floats) -> TorqueParts:
+        """As `at`, on a grid s; in a cell in which an actuator turns back, friction has either sign at both ends.
+
+        With |t + r| <= m for two values r of what friction adds, |t + (r + r') / 2| <= m - |r - r'| / 2.
+        """
+        parts, signs = self.at(s, slopes, bends), self._drives.signs(slopes)
+        turns = (signs[1:] != signs[:-1]) & self.rubs
+        either = np.zeros(signs.shape, bool)
+        either[1:], either[:-1] = turns, either[:-1] | turns
+        at = np.flatnonzero(either.any(axis=1))
+        if not len(at):
+            return parts
+        rest, most = parts.rest.copy(), np.array(parts.most)
+        ends = [self.at(s[at], np.where(either[at], sign * 1.0, slopes[at]), bends[at]).rest for sign in (1.0, -1.0)]
+        rest[at], most[at] = 0.5 * (ends[0] + ends[1]), most[at] - 0.5 * np.abs(ends[0] - ends[1])
+        return parts._replace(rest=rest, most=most)
+
     def _together(self, own: TorqueParts, minors: Floats) -> TorqueParts:
         """What redundant actuators do together, and the most of it."""
         shares = [share * self._work for _, share in facets_of(minors, len(self._limits), self._motions)]

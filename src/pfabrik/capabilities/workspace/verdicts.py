@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from ...answers.active_limits import active_limits
+from ...answers.active_limits import active_limits, stretched_joint
 from ...answers.margins import margins
 from ...answers.solution import Solution
 from ...answers.status import Status
@@ -31,6 +31,7 @@ from ...kinematics import (
     why_not_measured,
 )
 from ...machine.description.mechanism import Mechanism
+from ...machine.model import model_of
 from ...options import Options
 from ...tolerances import TOLERANCES
 from .space import Space
@@ -41,8 +42,8 @@ Limits: TypeAlias = tuple[tuple[str, str], ...]
 INSIDE, OUTSIDE = 1.0, -1.0
 """Values in place of margins where no closed form gives them: only the sign counts."""
 
-GEOMETRY = ("", "reach")
-"""The limit of a border that no limit of a joint forms, where no closed form gives the leg."""
+GEOMETRY = ("", "stretched")
+"""The limit of a border that no limit of a joint forms, where neither a closed form gives the leg nor links tell."""
 
 
 AZIMUTHS, RING = 24, math.radians(6.0)
@@ -90,7 +91,7 @@ class MapQuestion:
         if self.has_margins:
             return limits_of(self.mechanism)
         home = configuration(self.mechanism, home_coordinates(self.mechanism))
-        return (*margins(home), GEOMETRY)
+        return (*margins(home), *((joint.name, "stretched") for joint in self.mechanism.joints), GEOMETRY)
 
     @property
     def _grower(self) -> Grower:
@@ -251,7 +252,8 @@ class MapQuestion:
     def _active(self, coordinates: Floats) -> Ints:
         """The first limit that each row of joint coordinates is on, by its place in `limits`; that of reach if none."""
         place = {limit: index for index, limit in enumerate(self._known_limits)}
-        held = active_limits(self.mechanism, coordinates)
+        held, model = active_limits(self.mechanism, coordinates), model_of(self.mechanism)
+        held = [limits or stretched_joint(model, q[None]) for limits, q in zip(held, coordinates, strict=True)]
         return np.array(
             [place[limits[0].joint, limits[0].bound] if limits else self._unknown for limits in held], np.int64
         )

@@ -69,7 +69,7 @@ class DrivenLegs(Driven):
     def multipliers(self) -> dict[tuple[str, str], float]:
         """As of `Driven`."""
         values, own, drives = self._weighed(), self._live.search, self.drives
-        names = self._model.legs.limits
+        names, dead_points = self._model.legs.limits, self._model.legs.dead_points
         ranges, cones, found = len(own.limited) - len(drives), len(own.cones), dict[tuple[str, str], float]()
         ends = 2 * len(own.limited), 2 * len(own.limited) + cones, 2 * len(own.limited) + cones + len(own.legs)
         for number in np.flatnonzero(values > 0.0).tolist():
@@ -82,13 +82,9 @@ class DrivenLegs(Driven):
                 name = self._model.mechanism.actuator_names[place], bound
             elif number < ends[1]:
                 cone = 2 * ranges + number - ends[0]
-                name = (
-                    names[cone]
-                    if cone < len(names)
-                    else (f"leg {int(own.cones['leg'][number - ends[0]]) + 1}", "reach")
-                )
+                name = names[cone] if cone < len(names) else dead_points[int(own.cones["leg"][number - ends[0]])]
             elif number < ends[2]:
-                name = f"leg {number - ends[1] + 1}", "stretched"
+                name = dead_points[number - ends[1]]
             else:
                 name = pair_names(self._model.mechanism)[number - ends[2]], "near"
             found[name] = max(found.get(name, 0.0), float(values[number]))

@@ -28,7 +28,7 @@ class PlacedLegs:
     implicit : the legs of these.
     twist : numbers that are zero, by which expressions have slopes by the pose: velocity [length], angular velocity.
     margins, limits : the margins that can bind, and their limits.
-    reach : the margins of the reach of legs among them.
+    reach_rows, reach : the places of the dead points of legs among them, and their margins.
     actuators : values of the actuators [length or rad].
     rows : the constraints [L or rad].
     uniform : the numbers, the same at all poses, that all these are computed from.
@@ -54,9 +54,15 @@ class PlacedLegs:
         of_numbers(answer.place_legs)(legs, placed, sides, values, lines)
         of_numbers(answer.put_leg_rows)(legs, placed, values, lines, rows)
         measured = zip(table.measured_limits, _margins(records, values, rows), strict=True)
-        binding = [(limit, margin) for limit, margin in measured if isinstance(margin, Number) or margin < math.inf]
-        self.limits, self.margins = tuple(limit for limit, _ in binding), [margin for _, margin in binding]
-        self.reach = [m for m, (_, bound) in zip(self.margins, self.limits, strict=True) if bound == "reach"]
+        binding = [
+            (place, limit, margin)
+            for place, (limit, margin) in enumerate(measured)
+            if isinstance(margin, Number) or margin < math.inf
+        ]
+        self.limits, self.margins = tuple(limit for _, limit, _ in binding), [margin for _, _, margin in binding]
+        dead_points = range(len(table.limits), len(table.limits) + n)
+        self.reach_rows = tuple(row for row, (place, _, _) in enumerate(binding) if place in dead_points)
+        self.reach = [self.margins[row] for row in self.reach_rows]
         self.rows = rows.tolist()
         deviation = of_numbers(answer.deviation)
         driven = sorted(records["driven"], key=lambda each: each["column"])

@@ -100,13 +100,15 @@ class VariedMachine:
         Names of the p dimensions that vary.
     limits : tuple of tuple of str
         Pairs (joint, bound) of the r limits: those of `Feasibility.limits` that can bind.
+    reach_rows : tuple of int
+        Which of them are dead points of legs.
     """
 
     def __init__(self, mechanism: Mechanism, names: tuple[str, ...]) -> None:
         self.mechanism, self.names = mechanism, names
         own = np.array([mechanism.dimensions[name] for name in names])
         self._noted = [NotedMachine(mechanism, names, own)]
-        self.limits = self._noted[0].legs.limits
+        self.limits, self.reach_rows = self._noted[0].legs.limits, self._noted[0].legs.reach_rows
 
     def at(self, values: ArrayLike) -> MachineAt:
         """The machine at values (p,) of the dimensions, in the units of the file.

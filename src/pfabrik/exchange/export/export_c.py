@@ -140,8 +140,8 @@ def c_source(
     for part in {*parts} & {part for part, reason in reasons.items() if reason}:
         reason = f"{reasons[part]}: leave '{part}' out of `parts` (--parts ik,limits,fk,rates)"
         raise UnsupportedMechanism(mechanism.name, [reason], "exported")
-    if "effort" in parts and (reasons := unplaced_masses(machine.mechanism, machine.bodies)):
-        raise UnsupportedMechanism(mechanism.name, reasons, "exported with 'effort'")
+    if "effort" in parts and (unplaced := unplaced_masses(machine.mechanism, machine.bodies)):
+        raise UnsupportedMechanism(mechanism.name, unplaced, "exported with 'effort'")
     if "fk" in parts and machine.uncontrolled:
         left = counted(machine.uncontrolled, "freedom")
         reason = f"its actuators leave the end effector {left}: leave 'fk' out of `parts` (--parts ik,limits,rates)"

@@ -78,7 +78,6 @@ def _fewest(answer: Callable[[int], Floats], size: float, enough: float) -> int:
 
 Backend: TypeAlias = Literal["numpy", "torch", "jax"]
 BACKENDS: tuple[Backend, ...] = get_args(Backend)
-TASK = "task"
 
 
 def export_tensors(
@@ -86,7 +85,7 @@ def export_tensors(
     path: str | PathLike[str],
     *,
     backend: Backend = "numpy",
-    joints: str | Sequence[str] = TASK,
+    joints: str | Sequence[str] | None = None,
 ) -> Path:
     """Write a mechanism's kinematics as one Python file of tensors, which needs this library no more.
 
@@ -105,8 +104,8 @@ def export_tensors(
     backend : {"numpy", "torch", "jax"}, optional
         Library of the arrays.
     joints : str or sequence of str, optional
-        Names of joints in series from the base to the end effector, which then are the coordinates; "task" for poses of
-        the platform, of which what the task leaves open is completed.
+        Names of joints in series from the base to the end effector, which then are the coordinates; by default poses of
+        the platform are, of which what the task leaves open is completed.
 
     Raises
     ------
@@ -122,16 +121,18 @@ def export_tensors(
     return Path(path)
 
 
-def tensor_source(mechanism: Mechanism, *, backend: Backend = "numpy", joints: str | Sequence[str] = TASK) -> str:
+def tensor_source(
+    mechanism: Mechanism, *, backend: Backend = "numpy", joints: str | Sequence[str] | None = None
+) -> str:
     """The text that `export_tensors` writes."""
     checked_mechanism(mechanism)
     require_choice("backend", backend, BACKENDS)
-    names = require_names("joints", [joints] if isinstance(joints, str) else joints)
-    machine = TensorMachine(mechanism, None if tuple(names) == (TASK,) else names)
+    names = None if joints is None else require_names("joints", [joints] if isinstance(joints, str) else joints)
+    machine = TensorMachine(mechanism, names)
     return tensor_text(machine, backend, steps_of(machine))
 
 
-def export_numpy(mechanism: Mechanism, path: str | PathLike[str], *, joints: str | Sequence[str] = TASK) -> Path:
+def export_numpy(mechanism: Mechanism, path: str | PathLike[str], *, joints: str | Sequence[str] | None = None) -> Path:
     """Write a mechanism's kinematics as one file of NumPy arrays: `export_tensors` with backend "numpy".
 
     Parameters
@@ -146,7 +147,7 @@ def export_numpy(mechanism: Mechanism, path: str | PathLike[str], *, joints: str
     return export_tensors(mechanism, path, backend="numpy", joints=joints)
 
 
-def export_torch(mechanism: Mechanism, path: str | PathLike[str], *, joints: str | Sequence[str] = TASK) -> Path:
+def export_torch(mechanism: Mechanism, path: str | PathLike[str], *, joints: str | Sequence[str] | None = None) -> Path:
     """Write a mechanism's kinematics as one file of PyTorch tensors: `export_tensors` with backend "torch".
 
     Parameters
@@ -161,7 +162,7 @@ def export_torch(mechanism: Mechanism, path: str | PathLike[str], *, joints: str
     return export_tensors(mechanism, path, backend="torch", joints=joints)
 
 
-def export_jax(mechanism: Mechanism, path: str | PathLike[str], *, joints: str | Sequence[str] = TASK) -> Path:
+def export_jax(mechanism: Mechanism, path: str | PathLike[str], *, joints: str | Sequence[str] | None = None) -> Path:
     """Write a mechanism's kinematics as one file of JAX arrays: `export_tensors` with backend "jax".
 
     Parameters

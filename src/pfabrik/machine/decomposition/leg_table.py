@@ -20,7 +20,7 @@ from ..description.joints import Joint
 from ..description.mechanism import Mechanism
 from ..description.task import task_of
 from ..noted_numbers import largest
-from ..noted_vectors import area, sign
+from ..noted_vectors import Vector, area, sign
 from .decompose import SubChain, sub_chains
 from .home_numbers import Fields, FilledRecords, HomeNumbers
 from .intermediate_platforms import legs_of_sub_chain
@@ -29,6 +29,10 @@ from .leg_records import leg_records
 
 NO_PATH = "does not lead to the end effector"
 """The reason of a sub-chain that is on no path to the end effector."""
+
+DEAD_POINTS = ("stretched", "level")
+"""Bounds of legs at dead points: links stretched out or folded, or square to a slide; a rod on an upright slide is then
+level."""
 
 MOST_WRITTEN = 12
 """Joints of a sub-chain that are all written in a message: more do not fit a line."""
@@ -136,10 +140,21 @@ class LegTable:
 
     @cached_property
     def measured_limits(self) -> tuple[tuple[str, str], ...]:
-        """The limits that feasibility measures: ranges and cones, then the reach of legs, then their closure."""
-        reach = tuple((_proximal_joint(form), "reach") for form in self.forms)
-        closed = tuple((form.elements[0].joint.name if form.elements else "", "not closed") for form in self.forms)
-        return self.limits + reach + closed
+        """The limits that feasibility measures: ranges and cones, then dead points of legs, then their closure."""
+        closed = tuple(
+            dead_point if isinstance(form, Rod) and form.is_shared else (_first_joint(form), "not closed")
+            for form, dead_point in zip(self.forms, self.dead_points, strict=True)
+        )
+        return self.limits + self.dead_points + closed
+
+    @cached_property
+    def dead_points(self) -> tuple[tuple[str, str], ...]:
+        """The joint and the bound of each leg's dead point, beyond which it does not reach."""
+        found: list[tuple[str, str]] = []
+        for form in self.forms:
+            is_shared = isinstance(form, Rod) and form.is_shared
+            found.append(found[-1] if is_shared and found else _dead_point(form))
+        return tuple(found)
 
     def task_within(self, farthest: float) -> Records:
         """The task, with the motion of what it leaves open limited to `farthest` [L or rad]."""
@@ -148,11 +163,17 @@ class LegTable:
         return task
 
 
-def _proximal_joint(form: LegForm) -> str:
-    """The proximal joint of a leg, or its first one."""
+def _dead_point(form: LegForm) -> tuple[str, str]:
+    """The proximal joint of a leg, or its first one, and the bound: a rod on a vertical slide is level there."""
     proximal = form.proximal if isinstance(form, Rod) else None
-    items = (proximal,) if proximal is not None else form.elements
-    return items[0].joint.name if items else ""
+    if proximal is None:
+        return _first_joint(form), "stretched"
+    is_upright = proximal.kind == "P" and area(proximal.axis, Vector((0.0, 0.0, 1.0))) <= TOLERANCES.implied
+    return proximal.joint.name, "level" if is_upright else "stretched"
+
+
+def _first_joint(form: LegForm) -> str:
+    return form.elements[0].joint.name if form.elements else ""
 
 
 def leg_table(mechanism: Mechanism, numbers: Sequence[Any] = ()) -> LegTable:

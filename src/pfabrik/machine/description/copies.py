@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,9 @@ from .body_shapes import Shape
 from .coercion import numbers, unit_vector
 from .form_faults import direction_faults, is_name, is_numbers, is_pair_of_names, is_point, shown, table_faults
 from .joints import Joint, Vector
+
+PLACED = ("at", "ends", "axis", "axes", "file", "centre", "inertia")
+"""Fields of a shape or a mass in base coordinates at home, which another copy has elsewhere unless it is turned."""
 
 MOST_COPIES = 100
 """Most copies of one joint: a typing error beyond it, and a file of one line must not ask for a million joints."""
@@ -33,6 +38,24 @@ def read_copies(place: str, copies: Any, faults: list[Fault]) -> tuple[int, Vect
     found += direction_faults(f"{place}.axis", axis)
     faults += found
     return None if found else (int(count), axis)
+
+
+@dataclass(frozen=True)
+class Turn:
+    """`step` of `steps` equal parts of a full turn about a unit vector through the origin; by default none."""
+
+    axis: Vector = (0.0, 0.0, 1.0)
+    step: int = 0
+    steps: int = 1
+
+
+@dataclass(frozen=True)
+class BodyCopy:
+    """One of the bodies that a name stands for: `number` is behind its name, and behind those of its joints."""
+
+    body: str
+    number: int
+    turn: Turn
 
 
 @dataclass(frozen=True)
@@ -58,11 +81,18 @@ class Copy:
 
 @dataclass(frozen=True)
 class Patterns:
-    """The patterns of a file, with the base and the end effector, which are never copied."""
+    """The patterns of a file, with the base and the end effector, which are never copied.
+
+    Attributes
+    ----------
+    leg_bodies : the bodies of legs, by their names without a number; leg_joints : such names of their joints.
+    """
 
     patterns: tuple[Pattern, ...]
     base: str
     end_effector: str
+    leg_bodies: Mapping[str, Sequence[BodyCopy]] = field(default_factory=dict)
+    leg_joints: frozenset[str] = frozenset()
 
     def copied_bodies(self) -> dict[str, Pattern]:
         """The bodies that have copies, each with the first pattern that says so."""
@@ -92,28 +122,57 @@ class Patterns:
         bodies, joints = frozenset(self.copied_bodies()), self.copied_joints()
         return [copy for index, pattern in enumerate(self.patterns) for copy in _copies(index, pattern, bodies, joints)]
 
+    @cached_property
+    def families(self) -> dict[str, Sequence[BodyCopy]]:
+        """The bodies that one name stands for: those with copies, and those of legs."""
+        own = {body for pattern in self.patterns for body in self._own_bodies(pattern)}
+        families = {name: bodies for name, bodies in self.leg_bodies.items() if name not in own}
+        for body, pattern in self.copied_bodies().items():
+            count, axis = pattern.count or 0, pattern.axis or Turn.axis
+            turns = [Turn(axis, step, count) for step in range(count)]
+            families[body] = [BodyCopy(f"{body}{k}", k, turn) for k, turn in enumerate(turns, 1)]
+        return families
+
+    def copies_of(self, body: Any) -> Sequence[BodyCopy]:
+        """The bodies that a name stands for; none where it is that of one body, or of none."""
+        return self.families.get(body, ()) if isinstance(body, str) else ()
+
     def copied_shapes(self, shape: Shape) -> list[Shape]:
         """The shapes that one stands for: a copy for each copy of its body, turned and renamed as that is."""
-        bodies, joints = self.copied_bodies(), self.copied_joints()
-        pattern = bodies.get(shape.body) if isinstance(shape.body, str) else None
-        if pattern is None or pattern.count is None or pattern.axis is None:
-            return [shape]
-        count, names = pattern.count, frozenset(bodies)
+        joints = self.copied_joints() | self.leg_joints
         return [
             dataclasses.replace(
-                _turned_shape(shape, pattern.axis, number - 1, count),
-                body=_numbered(shape.body, number, names),
-                between=_numbered(shape.between, number, joints),
+                _turned_shape(shape, copy.turn), body=copy.body, between=_numbered(shape.between, copy.number, joints)
             )
-            for number in range(1, count + 1)
-        ]
+            for copy in self.copies_of(shape.body)
+        ] or [shape]
 
     def copied_masses(self, mass: Mass) -> list[Mass]:
         """The masses that one stands for, as of shapes."""
-        pattern = self.copied_bodies().get(mass.body) if isinstance(mass.body, str) else None
-        if pattern is None or pattern.count is None or pattern.axis is None:
-            return [mass]
-        return [_turned_mass(mass, pattern.axis, number - 1, pattern.count) for number in range(1, pattern.count + 1)]
+        return [
+            dataclasses.replace(turned_mass(mass, copy.turn), body=copy.body) for copy in self.copies_of(mass.body)
+        ] or [mass]
+
+    def place_faults(self, place: str, of_body: Shape | Mass) -> Iterator[Fault]:
+        """Faults of what has one place at home, said of bodies that are not turned copies of one: legs at their own
+        points."""
+        copies = self.copies_of(of_body.body)
+        if not copies or len(copies) == copies[0].turn.steps:
+            return
+        for key in PLACED:
+            value = getattr(of_body, key, None)
+            if value is not None:
+                found = f"{shown(value)}, and '{of_body.body}' stands for {len(copies)} bodies, each at its own place"
+                yield Fault(f"{place}.{key}", found, f"a table for each of them: '{copies[0].body}', …")
+
+    def by_family(self, found: str) -> str:
+        """What is found in place of a body, with the near miss that stands for all copies, not for one of them."""
+        match = re.match(r"'(.*)': no such body", found)
+        if match is None:
+            return found
+        numbered = {copy.body for copies in self.families.values() for copy in copies}
+        bodies = {body for copy in self.expanded() for body in copy.joint.connects} - numbered
+        return f"{match[0]}{near_miss(match[1], [*self.families, *sorted(bodies)])}"
 
     def as_written(self, text: str, copy: Copy) -> str:
         """A text about a copy with the names as its file writes them, without the copy's number."""
@@ -164,7 +223,7 @@ def _copies(index: int, pattern: Pattern, bodies: frozenset[str], joints: frozen
         yield Copy(index, 0, pattern.joint)
         return
     for number in range(1, pattern.count + 1):
-        copied = turned(pattern.joint, pattern.axis, number - 1, pattern.count)
+        copied = turned(pattern.joint, Turn(pattern.axis, number - 1, pattern.count))
         yield Copy(index, number, _renamed(copied, number, bodies, joints))
 
 
@@ -186,53 +245,50 @@ def _numbered(names: Any, number: int, copied: frozenset[str]) -> Any:
     return f"{names}{number}" if isinstance(names, str) and names in copied else names
 
 
-def turned(joint: Joint, axis: Vector, step: int, steps: int) -> Joint:
-    """The joint turned by `step` of `steps` equal parts of a full turn; by none, it is the same to the last bit."""
-    if step == 0:
+def turned(joint: Joint, turn: Turn) -> Joint:
+    """The joint turned; by none, it is the same to the last bit."""
+    if turn.step == 0:
         return joint
-    at, along, axes = (_turned(value, axis, step, steps) for value in (joint.at, joint.axis, joint.axes))
-    cone = joint.cone and dataclasses.replace(joint.cone, axis=_turned(joint.cone.axis, axis, step, steps))
+    at, along, axes = (_turned(value, turn) for value in (joint.at, joint.axis, joint.axes))
+    cone = joint.cone and dataclasses.replace(joint.cone, axis=_turned(joint.cone.axis, turn))
     return dataclasses.replace(joint, at=at, axis=along, axes=axes, cone=cone)
 
 
-def _turned_shape(shape: Shape, axis: Vector, step: int, steps: int) -> Shape:
-    """The shape turned by `step` of `steps` equal parts of a full turn."""
-    if step == 0:
+def _turned_shape(shape: Shape, turn: Turn) -> Shape:
+    if turn.step == 0:
         return shape
     at_home = {field: getattr(shape, field) for field in ("at", "axis", "ends", "axes")}
     if shape.kind in ("box", "mesh") and shape.axes is None:
         at_home["axes"] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    return dataclasses.replace(shape, **{field: _turned(each, axis, step, steps) for field, each in at_home.items()})
+    return dataclasses.replace(shape, **{name: _turned(each, turn) for name, each in at_home.items()})
 
 
-def _turned_mass(mass: Mass, axis: Vector, step: int, steps: int) -> Mass:
-    """The mass of a copy, turned by `step` of `steps` equal parts of a full turn."""
-    centre, inertia = _turned(mass.centre, axis, step, steps), mass.inertia
-    if step > 0 and inertia is not None and is_numbers(inertia, 6):
-        turn = np.array(
-            [rotated(row, axis, step, steps) for row in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
-        )
-        inertia = as_moments(turn.T @ as_matrix(inertia) @ turn)
-    return dataclasses.replace(
-        mass, body=f"{mass.body}{step + 1}", centre=centre if step else mass.centre, inertia=inertia
-    )
+def turned_mass(mass: Mass, turn: Turn) -> Mass:
+    """The mass turned; by none, it is the same to the last bit."""
+    if turn.step == 0:
+        return mass
+    inertia = mass.inertia
+    if inertia is not None and is_numbers(inertia, 6):
+        rows = [rotated(row, turn) for row in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
+        inertia = as_moments(np.transpose(rows) @ as_matrix(inertia) @ np.array(rows))
+    return dataclasses.replace(mass, centre=_turned(mass.centre, turn), inertia=inertia)
 
 
-def _turned(value: Any, axis: Vector, step: int, steps: int) -> Any:
+def _turned(value: Any, turn: Turn) -> Any:
     """A vector, or those in a tuple, turned; anything else as it is."""
     if is_point(value):
-        return rotated(value, axis, step, steps)
-    return tuple(_turned(each, axis, step, steps) for each in value) if isinstance(value, tuple) else value
+        return rotated(value, turn)
+    return tuple(_turned(each, turn) for each in value) if isinstance(value, tuple) else value
 
 
-def rotated(vector: Vector, axis: Vector, step: int, steps: int) -> Vector:
-    """The vector turned about a unit axis by `step` of `steps` equal parts of a full turn, right-handed."""
-    cosine, sine = cos_sin(step, steps)
-    (x, y, z), (a, b, c) = vector, axis
+def rotated(vector: Vector, turn: Turn) -> Vector:
+    """The vector turned, right-handed."""
+    cosine, sine = cos_sin(turn.step, turn.steps)
+    (x, y, z), (a, b, c) = vector, turn.axis
     parallel = x * a + y * b + z * c
     cross = (b * z - c * y, c * x - a * z, a * y - b * x)
     rotated = (
-        parallel * k + cosine * (v - parallel * k) + sine * w for v, k, w in zip(vector, axis, cross, strict=True)
+        parallel * k + cosine * (v - parallel * k) + sine * w for v, k, w in zip(vector, turn.axis, cross, strict=True)
     )
     first, second, third = rotated
     return first, second, third

@@ -13,7 +13,8 @@ from .body_shapes import Shape
 from .copies import Copy, Pattern, Patterns
 from .faults import merged
 from .form_faults import is_name
-from .leg_joints import LegJoint, leg_shapes, placed_joints
+from .leg_bodies import PlaceOf, all_masses, all_shapes, bodies_of_legs, families_of
+from .leg_joints import LegJoint, placed_joints
 from .legs import Leg
 from .rules import joint_faults
 from .structure import Structure
@@ -47,7 +48,10 @@ def expanded(
     end_effector: Any = head.get("end_effector")
     start, end = base if is_name(base) else "base", end_effector if is_name(end_effector) else "platform"
     placed, of_legs = placed_joints(legs, start, end, [each.joint.name for each in patterns])
-    layout = Patterns((*patterns, *(Pattern(each.joint) for each in placed)), base, end_effector)
+    bodies = bodies_of_legs(legs, placed)
+    leg_joints = frozenset(each.joint.name.removesuffix(str(each.leg)) for each in placed)
+    as_patterns = (*patterns, *(Pattern(each.joint) for each in placed))
+    layout = Patterns(as_patterns, base, end_effector, families_of(bodies), leg_joints)
     single = [Copy(index, 0, each.joint) for index, each in enumerate(layout.patterns)]
     faults = merged(faults, [*head_faults(Structure(joints=(), **head)), *of_legs])
     is_unclear = bool(of_legs) or any(map(_hides_joints, faults))
@@ -58,13 +62,10 @@ def expanded(
         alone = [fault for copy in single for fault in joint_faults(f"joint[{copy.index}]", copy.joint)]
         raise InvalidMechanism(merged(faults, list(_as_written(alone, layout, single, placed, {}))))
     copies = layout.expanded()
-    thick = [
-        (copy, f"body[{index}]") for index, shape in enumerate(shapes) if shape for copy in layout.copied_shapes(shape)
-    ]
-    thick += leg_shapes(legs, placed)
-    heavy = [
-        (copy, f"body[{index}]") for index, mass in enumerate(masses) if mass for copy in layout.copied_masses(mass)
-    ]
+    of_tables: list[Fault] = []
+    thick = all_shapes(layout, shapes, bodies, of_tables)
+    heavy = all_masses(layout, masses, bodies, of_tables)
+    faults = merged(faults, of_tables)
     try:
         with warnings.catch_warnings():
             if faults:
@@ -94,15 +95,14 @@ def _as_written(
     layout: Patterns,
     copies: Sequence[Copy],
     placed: Sequence[LegJoint],
-    bodies: Mapping[str, Sequence[str]],
+    bodies: Mapping[str, Sequence[PlaceOf]],
 ) -> Iterator[Fault]:
     """Faults of joints and shapes at the places of what stands for them, each reported of one copy or leg only.
 
     Parameters
     ----------
     copies : the joints; the last patterns are those of `placed`.
-    bodies : of each shape ("body") and mass ("mass") its table; of a leg's link that of the leg, whose thickness is
-        then at fault.
+    bodies : where each shape ("body") and mass ("mass") is described.
     """
     reporter: dict[str, int] = {}
     first = len(layout.patterns) - len(placed)
@@ -115,8 +115,7 @@ def _as_written(
         found, expected, rest = fault.found, fault.expected, fault.place[match.end() :]
         place, who = fault.place, int(number)
         if table in bodies:
-            where, field = bodies[table][who], "name" if table == "mass" and field == "body" else field
-            place = f"{where}.{field}".rstrip(".") + rest if where.startswith("body") else f"{where}.thickness"
+            place, found = bodies[table][who](field) + rest, layout.by_family(found)
         elif (copy := copies[int(number)]).index < first:
             place, who = f"joint[{copy.index}].{field}".rstrip(".") + rest, copy.number
             found, expected = layout.as_written(found, copy), layout.as_written(expected, copy)

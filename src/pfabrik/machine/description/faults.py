@@ -83,8 +83,8 @@ def _rank(place: str) -> tuple[int, int, int, str]:
         list(_FIELDS).index(table),
         int(index),
         rank,
-        field if len(field) == 1 else "~",
-    )  # a leg's joints by letters
+        field if len(field) <= 2 else "~",
+    )  # a leg's joints and bodies by letters
 
 
 def joint_index(place: str) -> int:

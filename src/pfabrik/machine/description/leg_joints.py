@@ -1,4 +1,4 @@
-"""The joints that legs stand for, the links between these, and the name that the field has for them."""
+"""The joints that legs stand for, and the name that the field has for them."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from ...errors import Fault, near_miss
-from .body_shapes import Shape
-from .copies import MOST_COPIES, read_copies, turned
+from ...errors import Fault, counted, near_miss
+from .copies import MOST_COPIES, Turn, read_copies, turned
 from .form_faults import is_pair_of_names, shown, table_faults
 from .joints import DRIVE_FIELDS, Cone, Joint, Vector
-from .leg_points import EXPECTED, PLACEHOLDER, Point, axis_pairs, count_legs, directions, leg_points
-from .legs import CONE_KEYS, JOINT_KEYS, Leg, chain_faults, read_chain
+from .leg_points import EXPECTED, PLACEHOLDER, Point, axis_pairs, count_legs, directions, leg_points, points_of_legs
+from .legs import BODY_KEYS, CONE_KEYS, JOINT_KEYS, Leg, chain_faults, is_listed, neighbours, read_chain
 from .rules import faults_by, form, wrong
 
 
@@ -27,11 +26,13 @@ class LegJoint:
     Attributes
     ----------
     leg : the number of its leg, from 1.
+    turn : what its leg is turned by, as a copy.
     place, places : where the description says things of the joint, and of single fields of it.
     """
 
     joint: Joint
     leg: int
+    turn: Turn
     place: str
     places: Mapping[str, str]
 
@@ -48,6 +49,9 @@ class LegMaker:
         faults += faults_by(OF_LEGS, place, leg, self)
         self.points = leg_points(leg, self.steps, place, faults)
         self.legs = len(self.points[0]) if self.points else 1
+        for letters, values in self.said.items():
+            if values.get("centre") is not None and len(letters) == 2:
+                points_of_legs(f"{place}.{letters}.centre", values["centre"], self.legs, faults)
         copies = None if leg.copies is None else read_copies(f"{place}.copies", leg.copies, faults)
         self.turns, self.about = copies or (1, PLACEHOLDER)
         self.count = self.legs * self.turns if self.steps else 0
@@ -56,16 +60,40 @@ class LegMaker:
     def joints(self, number: int) -> Iterator[LegJoint]:
         """The joints of all legs, of which the first has this number."""
         patterns = [self._pattern(index) for index in range(len(self.steps))]
-        for turn in range(self.turns):
+        values = [self._values(index) for index in range(len(self.steps))]
+        for step in range(self.turns):
+            turn = Turn(self.about, step, self.turns)
             for leg in range(self.legs):
                 for index, pattern in enumerate(patterns):
                     placed = self._numbered(pattern[leg], index, number)
-                    yield dataclasses.replace(placed, joint=turned(placed.joint, self.about, turn, self.turns))
+                    own, places = values[index][step * self.legs + leg]
+                    joint = dataclasses.replace(turned(placed.joint, turn), **own)
+                    yield dataclasses.replace(placed, joint=joint, turn=turn, places={**placed.places, **places})
                 number += 1
 
+    def _values(self, index: int) -> list[tuple[dict[str, Any], dict[str, str]]]:
+        """Home and range of a joint in every leg, copies included, and where they are said."""
+        step, place = self.steps[index], f"{self.place}.{self.steps[index].letter}"
+        said = self.said.get(step.letter, {})
+        given = {"home": (said.get("home", 0.0), f"{place}.home"), "range": (said.get("range"), f"{place}.range")}
+        if said.get("range") is None and self.slides == [step.letter]:
+            given["range"] = self.leg.stroke, f"{self.place}.stroke"
+        found: list[tuple[dict[str, Any], dict[str, str]]] = [({}, {}) for _ in range(self.count)]
+        for field, (value, where) in given.items():
+            is_list = is_listed(field, step.type, value)
+            if is_list and len(value) not in (self.legs, self.count):
+                legs = f"one for each leg: {self.count}"
+                self.faults.append(Fault(where, counted(len(value), "value"), f"one, or {legs}"))
+                value, is_list = value[0], False
+            for leg, (fields, places) in enumerate(found):
+                fields[field] = value[leg % len(value)] if is_list else value
+                places[field] = f"{where}[{leg % len(value)}]" if is_list else where
+        return found
+
     def _said(self) -> dict[str, Mapping[str, Any]]:
-        """What is said of single joints, by letter, as far as it makes sense."""
+        """What is said of single joints and bodies, by letters, as far as it makes sense."""
         letters = [step.letter for step in self.steps]
+        bodies = [first + second for first, second in pairwise(letters)]
         said: dict[str, Mapping[str, Any]] = {}
         by_letter: Any = self.leg.by_letter
         if not isinstance(by_letter, Mapping):
@@ -73,15 +101,26 @@ class LegMaker:
             return said
         for letter, values in by_letter.items():
             where = f"{self.place}.{letter}"
-            if self.steps and letter not in letters:
-                expected = f"one of {', '.join(letters)}, the joints of '{self.leg.chain}'"
-                self.faults.append(Fault(where, "a joint that the chain does not have", expected))
+            is_body = isinstance(letter, str) and len(letter) == 2
+            known, what = (bodies, "body") if is_body else (letters, "joint")
+            if self.steps and letter not in known:
+                of_chain = f"{'between ' if is_body else ''}the joints of '{self.leg.chain}'"
+                expected = f"one of {', '.join(known)}, {of_chain}" if known else f"none: it has none {of_chain}"
+                self.faults.append(Fault(where, f"a {what} that the chain does not have", expected))
                 continue
-            self.faults += table_faults(where, values, JOINT_KEYS)
+            self.faults += table_faults(where, values, BODY_KEYS if is_body else JOINT_KEYS)
             if isinstance(values, Mapping):
                 said[letter] = values
-        self.faults += self._star_faults(said)
+        self.faults += [*self._star_faults(said), *self._link_faults(said)]
         return said
+
+    def _link_faults(self, said: Mapping[str, Mapping[str, Any]]) -> Iterator[Fault]:
+        """What only a link between two joints with a centre can have."""
+        for letters, values in said.items():
+            for key in ("thickness", "density"):
+                if len(letters) == 2 and values.get(key) is not None and len(neighbours(self.steps, letters)) < 2:
+                    expected = f"nothing: '{letters}' is not between two joints with a centre; it has `mass`, `centre`"
+                    yield Fault(f"{self.place}.{letters}.{key}", shown(values[key]), expected)
 
     def _star_faults(self, said: Mapping[str, Mapping[str, Any]]) -> Iterator[Fault]:
         """What is said of actuators against the stars of the chain."""
@@ -98,14 +137,11 @@ class LegMaker:
         step = self.steps[index]
         said = self.said.get(step.letter, {})
         bodies = self._bodies(index)
-        limits, limits_place = said.get("range"), f"{self.place}.{step.letter}.range"
-        if limits is None and self.slides == [step.letter]:
-            limits, limits_place = self.leg.stroke, f"{self.place}.stroke"
         places = dict.fromkeys(("type", "actuated", "connects"), f"{self.place}.chain")
-        places |= {"name": f"{self.place}.name", "range": limits_place}
+        places["name"] = f"{self.place}.name"
         if said.get("actuated") is not None:
             places["actuated"] = f"{self.place}.{step.letter}.actuated"
-        fields: list[dict[str, Any]] = [{} for _ in range(self.legs)]
+        fields: list[dict[str, Any]] = [{each: said.get(each) for each in DRIVE_FIELDS} for _ in range(self.legs)]
         self._give_axes(index, said, fields, places)
         cones = self._cones(index, said.get("cone"), bodies)
         made = []
@@ -117,14 +153,12 @@ class LegMaker:
                 bodies,
                 at=at.at or (PLACEHOLDER if step.centred else None),
                 actuated=said.get("actuated", step.actuated) if step.actuated else False,
-                home=said.get("home", 0.0),
-                range=limits,
                 cone=cones[leg],
-                **{field: said.get(field) for field in DRIVE_FIELDS},
                 **fields[leg],
             )
             end = self._next_place(index, leg)
-            made.append(LegJoint(joint, leg, f"{self.place}.{step.letter}", places | {"at": at.place, "along": end}))
+            places_of = places | {"at": at.place, "along": end}
+            made.append(LegJoint(joint, leg, Turn(), f"{self.place}.{step.letter}", places_of))
         return made
 
     def _next_place(self, index: int, leg: int) -> str:
@@ -267,7 +301,7 @@ def placed_joints(
     """
     placed: list[LegJoint] = []
     faults: list[Fault] = []
-    counted: Counter[str] = Counter()
+    number: Counter[str] = Counter()
     for index, leg in enumerate(legs):
         place = f"leg[{index}]"
         if leg.connects is None and end_effector in tips:
@@ -275,8 +309,8 @@ def placed_joints(
             faults.append(Fault(f"{place}.connects", found, "the two bodies that the legs lead from and to"))
         ends = leg.connects if leg.connects is not None and is_pair_of_names(leg.connects) else (base, end_effector)
         maker = LegMaker(leg, place, ends, faults)
-        placed += maker.joints(counted[str(leg.name)] + 1)
-        counted[str(leg.name)] += maker.count
+        placed += maker.joints(number[str(leg.name)] + 1)
+        number[str(leg.name)] += maker.count
     return placed, faults
 
 
@@ -285,20 +319,6 @@ def count_joints(leg: Leg) -> int:
     copies = leg.copies.get("count") if isinstance(leg.copies, Mapping) else 1.0
     turns = int(copies) if isinstance(copies, float) and 1.0 <= copies <= MOST_COPIES else 1
     return count_legs(leg.base, leg.platform) * len(read_chain(leg.chain)) * turns
-
-
-def leg_shapes(legs: Sequence[Leg], placed: Sequence[LegJoint]) -> list[tuple[Shape, str]]:
-    """The capsules of legs with a thickness, between neighbouring joints with a centre, and where that is said."""
-    shapes: list[tuple[Shape, str]] = []
-    for index, leg in enumerate(legs):
-        place = f"leg[{index}]"
-        own = [part for part in placed if part.place.startswith(f"{place}.") and part.joint.at is not None]
-        for first, second in pairwise(own):
-            if leg.thickness is not None and first.leg == second.leg:
-                ends = (first.joint.name, second.joint.name)
-                shape = Shape(second.joint.connects[0], thickness=leg.thickness, between=ends)
-                shapes.append((shape, place))
-    return shapes
 
 
 def legs_name(legs: Sequence[Leg]) -> str:

@@ -126,7 +126,7 @@ def leg_points(leg: Leg, steps: Sequence[ChainJoint], place: str, faults: list[F
     if count < 2:
         ends = _only_end(leg, place, count, faults)
     legs = count_legs(*ends.values())
-    found = {name: _row(f"{place}.{name}", value, legs, faults) for name, value in ends.items()}
+    found = {name: points_of_legs(f"{place}.{name}", value, legs, faults) for name, value in ends.items()}
     between = _via(leg, place, count - 2, legs, faults)
     return [row for name in ("base", "via", "platform") for row in ([found[name]] if name in found else between) if row]
 
@@ -152,7 +152,7 @@ def _depth(value: Any) -> int:
     return 1 + _depth(value[0] if value else None) if isinstance(value, tuple) else 0
 
 
-def _row(place: str, value: Any, legs: int, faults: list[Fault]) -> list[Point]:
+def points_of_legs(place: str, value: Any, legs: int, faults: list[Fault]) -> list[Point]:
     """One point for each leg."""
     if isinstance(value, tuple) and value and not any(isinstance(part, tuple) for part in value):
         return [_point(place, value, faults)] if legs == 1 else _wrong_count(place, 1, legs, faults)
@@ -185,11 +185,11 @@ def _via(leg: Leg, place: str, joints: int, legs: int, faults: list[Fault]) -> l
             faults.append(Fault(where, shown(value), expected))
         return []
     if joints == 1 and _depth(value) < 3:
-        return [_row(where, value, legs, faults)]
+        return [points_of_legs(where, value, legs, faults)]
     flat = joints > 1 and legs > 1 and _depth(value) < 3
     if not isinstance(value, tuple) or len(value) != joints or flat:
         lists = "a list of points" if joints == 1 else f"{joints} lists of points, one for each joint"
         found = f"{len(value)} lists" if isinstance(value, tuple) and _depth(value) == 3 else shown(value)
         faults.append(Fault(where, found, f"{lists} of '{leg.chain}' between `base` and `platform`"))
         return [[Point(None, where)] * legs] * joints
-    return [_row(f"{where}[{joint}]", each, legs, faults) for joint, each in enumerate(value)]
+    return [points_of_legs(f"{where}[{joint}]", each, legs, faults) for joint, each in enumerate(value)]

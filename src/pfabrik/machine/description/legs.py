@@ -21,6 +21,9 @@ LEG_KEYS = ("chain", "name", "connects", "base", "via", "platform", "axis", "str
 JOINT_KEYS = ("axis", "axes", "actuated", "home", "range", "cone", *DRIVE_FIELDS)
 """What can be said of one joint of a chain."""
 
+BODY_KEYS = ("thickness", "density", "mass", "centre")
+"""What can be said of a body between two of its joints."""
+
 CONE_KEYS = ("axis", "half_angle", "fixed_to")
 """What can be said of its cone."""
 
@@ -51,18 +54,21 @@ class Leg:
         Direction of the joints that need one: three numbers or a word ("radial", "tangential", "vertical", "x", "y",
         "z", "-" before it for the opposite), for all legs or one for each leg.
     stroke : tuple of float or None
-        Range of the prismatic joint [length].
+        Range of the prismatic joint [length]; one for all legs, or one for each.
     name : str
         What comes before the names of joints and bodies.
     connects : tuple of str or None
         The bodies that the legs lead from and to; the base and the end effector by default.
     by_letter : mapping of str to mapping
-        What is said of single joints, by their letters: {"A": {"axis": "radial", "range": (-1, 1)}}. Keys are axis,
+        What is said of joints and bodies, by letters: {"A": {"axis": "radial", "range": (-1, 1)}}. Keys are axis,
         axes, home, range, cone and those of actuators, max_speed to friction, as in `Joint`, directions as above; and,
         of a C with
         `*` in the chain, actuated: which of its coordinates is driven, by default both. A cone is a mapping too:
         half_angle; axis, by default the line that it limits, at home; fixed_to, by default the base or the end effector
-        at the ends of the chain and the inner body between.
+        at the ends of the chain and the inner body between. Home and range are one for all legs, or a list with one for
+        each. A body is called by the letters of its two joints: {"AB": {"thickness": 10, "density": 2700}}. Its keys
+        are thickness, by default that of the leg, density or mass, and centre, a point for each leg, or a single one,
+        at home; by default that of the link.
     copies : mapping or None
         {"count": 3, "axis": (0, 0, 1)}: rotational copies about an axis through the origin.
     thickness : float or None
@@ -131,6 +137,21 @@ def read_chain(chain: Any) -> tuple[ChainJoint, ...]:
         return ()
     parts = zip(LETTERS, chain.split("-"), strict=False)
     return tuple(ChainJoint(letter, _TYPES[part[0]], part.endswith("*")) for letter, part in parts)
+
+
+def neighbours(steps: Sequence[ChainJoint], letters: str) -> tuple[str, ...]:
+    """The letters of the joints with a centre next to a body, before it and behind it: the ends of its link."""
+    before = [step.letter for step in steps if step.centred and step.letter <= letters[0]]
+    behind = [step.letter for step in steps if step.centred and step.letter >= letters[1]]
+    return (*before[-1:], *behind[:1])
+
+
+def is_listed(field: str, type_: JointType, value: Any) -> bool:
+    """True if the value of a joint's `home` or `range` is a list of them, one for each leg."""
+    depth = (field == "range") + (len(KINDS[type_].coordinates) > 1)
+    for _ in range(depth):
+        value = value[0] if isinstance(value, list | tuple) and value else None
+    return isinstance(value, list | tuple) and bool(value)
 
 
 def chain_faults(place: str, chain: Any) -> Iterator[Fault]:

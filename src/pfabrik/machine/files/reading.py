@@ -10,6 +10,7 @@ import dataclasses
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
 
@@ -21,7 +22,7 @@ from ..description.expanded import Described, expanded
 from ..description.form_faults import key_faults, shown
 from ..description.joints import Cone, Joint, set_fields
 from ..description.leg_joints import count_joints
-from ..description.legs import CONE_KEYS, JOINT_KEYS, LEG_KEYS, ChainJoint, Leg, read_chain
+from ..description.legs import BODY_KEYS, CONE_KEYS, JOINT_KEYS, LEG_KEYS, ChainJoint, Leg, is_listed, read_chain
 from ..description.mechanism import Mechanism
 from ..description.structure import Structure
 from .dimensions import NoNumber, dimension_values, number_of, with_numbers
@@ -218,10 +219,10 @@ def _shape(table: Table, place: str, faults: list[Fault]) -> Shape | None:
 
 def _leg(table: Table, place: str, angle_unit: str, faults: list[Fault]) -> Leg:
     """The legs that a table describes, as far as it can be read."""
-    letters = sorted(key for key in table if re.fullmatch("[A-Z]", key))
+    letters = sorted(key for key in table if re.fullmatch("[A-Z]{1,2}", key))
     steps = {step.letter: step for step in read_chain(table.get("chain"))}
     leg_fields = {key: value for key, value in table.items() if key not in letters}
-    alternative = ", or the letter of one of its joints: A, B, ..."
+    alternative = ", or the letter of one of its joints, or the two of a body: A, B, AB, ..."
     faults += key_faults(place, leg_fields, LEG_KEYS, lambda key: _leg_hint(key, list(steps) or ["A"]), alternative)
     by_letter = {letter: _joint_fields(table[letter], steps.get(letter), angle_unit) for letter in letters}
     values = {"chain": None} | {key: leg_fields[key] for key in LEG_KEYS if key in leg_fields}
@@ -232,6 +233,9 @@ def _leg_hint(key: str, letters: Sequence[str]) -> str:
     """A hint for an unknown key of a leg: a joint, a key of a joint, of the file's head, or of a leg."""
     if key.upper() in letters:
         return f"; did you mean '{key.upper()}'?"
+    if key in BODY_KEYS:
+        meant = " or ".join(f"'{a}{b}.{key}'" for a, b in pairwise(letters)) or "a table [[body]]"
+        return f"; did you mean {meant}?"
     if key in JOINT_KEYS:
         meant = " or ".join(f"'{letter}.{key}'" for letter in letters)
         return f"; did you mean {meant}?"
@@ -244,7 +248,11 @@ def _joint_fields(table: Any, step: ChainJoint | None, angle_unit: str) -> Any:
     if not isinstance(table, dict):
         return table
     kind, actuated = (step.type, table.get("actuated", step.actuated)) if step is not None else (None, False)
-    fields = {key: in_radians(key, value, kind, actuated, angle_unit) for key, value in table.items()}
+    fields = {}
+    for key, value in table.items():
+        listed = kind is not None and key in ("home", "range") and is_listed(key, kind, value)
+        each = [in_radians(key, item, kind, actuated, angle_unit) for item in (value if listed else [value])]
+        fields[key] = each if listed else each[0]
     cone = fields.get("cone")
     if isinstance(cone, dict) and "half_angle" in cone:
         fields["cone"] = cone | {"half_angle": angle_in_radians(cone["half_angle"], angle_unit)}

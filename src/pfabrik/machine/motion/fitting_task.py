@@ -157,6 +157,41 @@ def task_remark(mechanism: Mechanism) -> str:
     return f"the task {' '.join(mechanism.task)} asks for {asked}, {varied}: {fits}"
 
 
+def task_hint(mechanism: Mechanism) -> str:
+    """A sentence on a task that asks for more coordinates than the end effector has freedoms; empty if it does not."""
+    if len(mechanism.joints) > MOST_JOINTS_FOR_FREEDOM:
+        return ""
+    tasks, freedoms = fitting_tasks(mechanism), generic_of(mechanism).mobility.platform
+    asked = int(_counted(mechanism.task).sum())
+    if asked <= freedoms or not tasks or set(tasks[0].words) == set(mechanism.task):
+        return ""
+    return (
+        f"the task {' '.join(mechanism.task)} asks for {counted(asked, 'coordinate')}, and the end effector has "
+        f"{counted(freedoms, 'freedom')}: a task that fits is {' '.join(tasks[0].words)}"
+    )
+
+
+def what_follows(mechanism: Mechanism) -> str:
+    """What the task leaves out and the mechanism changes by itself: ``task z, tilt: x, y and yaw follow``; or empty."""
+    words = mechanism.task
+    if set(words) == set(mechanism.whole_task) or len(mechanism.joints) > MOST_JOINTS_FOR_FREEDOM:
+        return ""
+    moves = np.abs(generic_of(mechanism).directions).max(axis=1, initial=0.0) > TOLERANCES.alignment
+    moves &= ~_counted(words)[: len(moves)]
+    names = [axis for axis, varies in zip(AXES, moves[:3], strict=False) if varies]
+    turns = moves[3:]
+    if "tilt" in words:
+        names += ["yaw"] * bool(turns.any())
+    elif "yaw" in words:
+        names += ["tilt"] * bool(turns.any())
+    elif turns.any():
+        names.append("the rotation")
+    if not names:
+        return ""
+    listed = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+    return f"task {', '.join(words)}: {listed} follow{'s' * (len(names) == 1)}"
+
+
 def leaves_a_choice(mechanism: Mechanism) -> bool:
     """True if a task leaves freedoms open that move several of the other coordinates together: answers are a choice.
 

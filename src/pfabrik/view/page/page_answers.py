@@ -15,6 +15,7 @@ from ...configuration import configuration
 from ...engines.pose.answers import LegAnswers, sides_at
 from ...engines.pose.coordinates import joint_coordinates
 from ...kinematics import Model, displacements, home_coordinates, model_of
+from ...machine.decomposition.leg_table import DEAD_POINTS
 from ...machine.description.mechanism import Mechanism
 from ...tolerances import TOLERANCES
 from .page_data import why_no_page
@@ -64,7 +65,7 @@ def _limits(solution: Solution) -> list[dict[str, str]]:
     if solution.status == Status.REACHED:
         on = [limit for limit, margin in margins(solution).items() if float(margin) <= TOLERANCES.active]
     else:
-        on = [(limit.joint, limit.bound) for limit in solution._limits[0] if limit.bound != "stretched"]
+        on = [(limit.joint, limit.bound) for limit in solution._limits[0] if limit.bound not in DEAD_POINTS]
     return [{"joint": joint, "bound": bound} for joint, bound in on]
 
 

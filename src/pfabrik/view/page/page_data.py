@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -89,7 +89,7 @@ def _tables(model: Model, options: Options) -> dict[str, Any]:
         "question": _places(T.QUESTION),
         "drive": _places(DRIVE),
         "driven": [] if loop_blocks(model.mechanism) else legs.driven[["column", "unit"]].tolist(),
-        "multipliers": len(records["liveHessian"].multipliers),
+        "multipliers": len(cast(Any, records["liveHessian"]).multipliers),
         "active": TOLERANCES.active,
         "holding": TOLERANCES.holding,
         "jump": {
