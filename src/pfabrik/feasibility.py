@@ -13,9 +13,10 @@ from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .answers.words import bound_notes
 from .common.arrays import Floats, Ints, shaped
-from .common.executors import POSES_A_BLOCK, Workers, slices, told
+from .common.checks import require_callable
+from .common.executors import Workers, slices, told
 from .common.printed import ResultTable, plain
-from .common.telling import OnProgress, telling
+from .common.telling import OnProgress
 from .engines.engine import engine_of, legs_decide
 from .engines.joints.configurations import Configurations
 from .engines.joints.link_distances import least_distances, pair_names
@@ -123,16 +124,14 @@ def feasibility(
     if model.why_poses_do_not_suffice:
         raise UnsupportedMechanism(mechanism.name, [model.why_poses_do_not_suffice])
     poses, shape = as_targets(mechanism, targets)
-    if executor is None and on_progress is None and len(poses) <= POSES_A_BLOCK:
+    require_callable("on_progress", on_progress)
+    if executor is None and on_progress is None:
         margin, binding = _best_of_modes(mechanism, poses, configuration)
     else:
         parts = slices(len(poses))
         blocks = [(poses[block], configuration) for block in parts]
-        with (
-            telling(f"measuring {counted(len(poses), 'target')}", on_progress) as tell,
-            closing(Workers(executor, mechanism).results(_best_of_modes, blocks)) as results,
-        ):
-            each = list(told(results, parts, len(poses), tell))
+        with closing(Workers(executor, mechanism).results(_best_of_modes, blocks)) as results:
+            each = list(told(results, parts, len(poses), on_progress))
         margin, binding = (np.concatenate(values) for values in zip(*each, strict=True))
     return Feasibility(shaped(margin, shape), shaped(binding, shape), limits_of(mechanism))
 

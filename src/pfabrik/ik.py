@@ -12,8 +12,9 @@ from .answers.answer_fields import Before, PoseRequest
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .common.arrays import Floats
-from .common.executors import POSES_A_BLOCK, SLOWER, Workers, slices, told
-from .common.telling import OnProgress, telling
+from .common.checks import require_callable
+from .common.executors import SLOWER, Workers, slices, told
+from .common.telling import OnProgress
 from .engines.engine import engine_of, knows_all_modes
 from .engines.joints.close import measure_configurations
 from .engines.joints.closure_engine import ClosureEngine
@@ -23,7 +24,7 @@ from .engines.joints.parasitic import has_parasitic_motion
 from .engines.joints.projection import modes_of
 from .engines.kept_assembly import within_assembly
 from .engines.targets import Target, as_targets, refuse_invalid
-from .errors import InvalidArgument, counted
+from .errors import InvalidArgument
 from .kernels.rows import CERTAIN, HOLD, ITERATIONS, PROJECTED, REACHED, RESIDUAL
 from .machine.description.mechanism import Mechanism
 from .machine.model import model_of
@@ -59,8 +60,7 @@ def solve_ik(
         Of `concurrent.futures`, or one like it, on whose workers blocks of a batch are answered, with the same answers;
         default: here, on all cores.
     on_progress : callable, optional
-        Called with the rows that are answered and their number, block by block. By default, where stderr is a terminal,
-        a line says them from two seconds on.
+        Called with the rows that are answered and their number, block by block.
 
     Returns
     -------
@@ -87,14 +87,12 @@ def solve_by(
     """As `solve_ik`, by the engine that is chosen."""
     targets, shape = as_targets(mechanism, target)
     begin, before = start_of(mechanism, start, shape), start._request if isinstance(start, Solution) else None
-    if executor is None and on_progress is None and len(targets) <= POSES_A_BLOCK:
+    require_callable("on_progress", on_progress)
+    if executor is None and on_progress is None:
         solutions = _answers(mechanism, targets, begin, before, options, choose_engine)
     else:
-        with telling(f"answering {counted(len(targets), 'target')}", on_progress) as tell:
-            asked = mechanism, targets, begin, before, options, choose_engine
-            solutions = (
-                _answers(*asked) if executor is None and tell is None else _answers_by_blocks(executor, tell, *asked)
-            )
+        asked = mechanism, targets, begin, before, options, choose_engine
+        solutions = _answers_by_blocks(executor, on_progress, *asked)
     status = solutions.rows.status
     refuse_invalid(targets, shape, status, options)
     is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
