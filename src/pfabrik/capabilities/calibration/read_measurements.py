@@ -84,7 +84,7 @@ def read_measurements(
     columns = _in_units(_columns(file), mechanism)
     commanded = _commanded(columns, mechanism)
     _check_names(columns, mechanism, is_commanded=bool(commanded))
-    sensors = [n for n in mechanism.coordinate_names if n in columns and n not in mechanism.actuator_names]
+    sensors = [n for n in mechanism.coordinates_by_name if n in columns and n not in mechanism.actuator_names]
     if commanded:
         poses = _poses(commanded, mechanism)
         readings = _at_poses(mechanism, poses, [f"row {k}" for k in range(1, len(poses) + 1)])
@@ -181,7 +181,7 @@ def _check_names(columns: dict[str, Floats], mechanism: Mechanism, *, is_command
     if missing and not is_commanded:
         expected = "one for each actuator of the machine, or x, y, z as commanded"
         raise InvalidArgument("path", f"no column {', '.join(missing)}", expected)
-    known = [*mechanism.coordinate_names, *POSITION, *ANGLES, *QUATERNION, HEIGHT, DISTANCE, DISTANCE_TO]
+    known = [*mechanism.coordinates_by_name, *POSITION, *ANGLES, *QUATERNION, HEIGHT, DISTANCE, DISTANCE_TO]
     unknown = [name for name in columns if name not in known]
     if unknown:
         expected = "actuators, other coordinates, x, y, z, roll, pitch, yaw, height, distance and distance_to"

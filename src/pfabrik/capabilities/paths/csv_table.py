@@ -129,7 +129,7 @@ def named_columns(mechanism: Mechanism, columns: Any, scale: Any) -> NamedColumn
         if not isinstance(column, str):
             raise InvalidArgument(f"columns['{name}']", repr(column), "what the file calls the column")
     scales = scale if isinstance(scale, Mapping) else dict.fromkeys(LENGTHS, scale) if scale is not None else {}
-    joints = [f"{name}{unit}" for name in mechanism.coordinate_names for unit in ("", "_deg", "_rad")]
+    joints = [f"{name}{unit}" for name in mechanism.coordinates_by_name for unit in ("", "_deg", "_rad")]
     require_known("column", (*names, *scales), (*NUMERIC, *joints))
     for name, factor in scales.items():
         require_positive(f"scale of '{name}'", factor)

@@ -165,16 +165,17 @@ def refuse_swings(track: Track, curve: Curve) -> None:
 
 def _fastest(curve: Curve, limits: Limits) -> tuple[Timing, Limits]:
     """The fastest timing on a grid that is as fine as torques need it, and its limits, exact where it is."""
-    s = curve.grid()
+    s, before = curve.grid(), None
     timing = _fastest_on(s, curve, limits)
-    if limits.path is not None:
-        limits = with_exact_torques(curve, timing, limits)
-    for _ in range(REFINEMENTS if limits.path is not None else 0):
-        over = cells_over(curve, timing, limits)
+    if limits.path is None:
+        return timing, limits
+    limits = with_exact_torques(curve, timing, limits)
+    for _ in range(REFINEMENTS):
+        over = cells_over(curve, timing, limits, before)
         if not over.any():
             break
         over[1:-1] |= over[2:] | over[:-2]
-        s = np.sort(np.append(s, 0.5 * (s[1:] + s[:-1])[over]))
+        s, before = np.sort(np.append(s, 0.5 * (s[1:] + s[:-1])[over])), timing
         timing = _fastest_on(s, curve, limits)
     return timing, limits
 
@@ -244,6 +245,7 @@ def _sampled(track: Track, curve: Curve, timing: Timing, limits: Limits, every: 
     times = np.append(times[times < reached[-1] - 1e-9 * every], reached[-1])
     cells = np.clip(np.searchsorted(reached, times, side="right") - 1, 0, len(reached) - 2)
     places, *motion = timing.at(cells, times - reached[cells])
+    motion[0][-1] = timing.speeds[-1]  # not rounding, of which friction would have a sign
     sampled = motion_at(curve, limits, places, *motion)
     return Timed(
         mechanism=track.mechanism,
