@@ -42,10 +42,10 @@ def mass_matrix(solution: Solution, at: str | Sequence[str] = "task", *, loads: 
     array (..., k, k)
         Where the machine has more motions than `at` has coordinates, and actuators for all, what forces at these meet
         while the actuators are free: (J M_a^-1 J')^-1, with M_a at the actuators (Khatib, IEEE J. Robotics and
-        Automation 3, 1987, 43). Where the machine has fewer motions than `at` has coordinates, that of the possible motion nearest to the one
-        asked for, angles compared with lengths over L: of no higher rank than there are motions, with rows of zeros for
-        coordinates that never move. NaN where there is no configuration, the loops are in a constraint singularity, or
-        some motion that `at` has elsewhere cannot be made: there the machine resists it without bound.
+        Automation 3, 1987, 43). Where it has fewer, that of the possible motion nearest to the one asked for, angles
+        compared with lengths over L: of no higher rank than there are motions, with rows of zeros for coordinates that
+        never move. NaN where there is no configuration, the loops are in a constraint singularity, or some motion that
+        `at` has elsewhere cannot be made: there the machine resists it without bound.
 
     Raises
     ------
