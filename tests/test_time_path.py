@@ -532,3 +532,28 @@ def test_the_command_says_what_is_exceeded(tmp_path: Path, monkeypatch: pytest.M
         f"{each.actuator} exceeds its limit of torque by {each.share - 1.0:.2%}" for each in exceeded
     ]
     assert json.loads(pfabrik(f"{line} --json").stdout)["exceeded"][0]["step"] == exceeded[0].step
+
+
+@pytest.mark.parametrize("acceleration", [None, 3.0])
+def test_a_dwell_stops_the_path_for_its_time(acceleration: float | None, tmp_path: Path) -> None:
+    """Each part takes what it takes alone, and nothing moves between them."""
+    machine = pf.load("delta")
+    parts = ["G1 X20 Y0 Z-200 F6000\nG1 X40\n", "G1 X0 Y30\n"]
+    (tmp_path / "whole.gcode").write_text(f"G4 S0.25\n{parts[0]}G4 P500\nG4 P100\n{parts[1]}G4 S1\n")
+    read = pf.read_path(tmp_path / "whole.gcode", machine)
+    track = pf.track(machine, read.targets)
+    limits = {"speed": 3.0, "rate": 200.0} | ({} if acceleration is None else {"acceleration": acceleration})
+    timed = pf.time_path(track, dwells=read.dwells, **limits)
+    stop = int(np.flatnonzero(read.dwells)[1])
+    alone = [pf.time_path(pf.track(machine, each), **limits) for each in (read.targets[:stop], read.targets[stop:])]
+    first, second = (each.duration for each in alone)
+    assert timed.duration == pytest.approx(0.25 + first + 0.6 + second + 1.0, abs=1e-9)
+    assert (np.diff(timed.times) > 0.0).all() and np.diff(timed.times).max() < 1.001 / 200.0
+    for begin, end in ((0.0, 0.25), (0.25 + first, 0.85 + first), (0.85 + first + second, timed.duration)):
+        rows = (timed.times > begin + 1e-9) & (timed.times < end - 1e-9)
+        assert rows.sum() > 40 and not timed.rates[rows].any() and not timed.accelerations[rows].any()
+        assert np.ptp(timed.actuators[rows], axis=0).max() == 0.0
+    none = pf.time_path(track, dwells=0.0 * read.dwells, **limits)
+    assert none.duration == pf.time_path(track, **limits).duration
+    with pytest.raises(InvalidArgument, match="dwells"):
+        pf.time_path(track, dwells=-read.dwells, **limits)
