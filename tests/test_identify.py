@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import pfabrik as pf
+from pfabrik.machine.files import dumps
+from tests.command import pfabrik
 from tests.test_dynamics import units, weighed
 
 
@@ -189,7 +193,7 @@ def recorded(name: str, seed: int) -> tuple[pf.Mechanism, Measured, Any]:
     home, t, v, a = pf.solve_ik(truth, truth.home_pose).actuators, np.linspace(0.0, 6.0, 300)[:, None], 0.0, 0.0
     x = home
     for k in range(3):
-        size = 0.04 * units(truth)[0] * random.standard_normal(len(home)) / (k + 1)
+        size = 0.03 * units(truth)[0] * random.standard_normal(len(home)) / (k + 1)
         speed, phase = random.uniform(3.0, 9.0, len(home)), random.uniform(0.0, 6.0, len(home))
         x = x + size * np.sin(speed * t + phase)
         v, a = v + size * speed * np.cos(speed * t + phase), a - size * speed**2 * np.sin(speed * t + phase)
@@ -220,7 +224,7 @@ WRONG = {
 }
 """What goes wrong with efforts."""
 
-RECORDED = ("five_bar", "delta", "hexaglide", "nrpm", "rrr")
+RECORDED = ("five_bar", "delta", "hexaglide", "orthoglide", "prr")
 
 
 def doubt_of(drawing: pf.Mechanism, measured: Measured, efforts: Any, **options: Any) -> str:
@@ -267,7 +271,7 @@ def test_wrong_efforts_are_doubted_on_four_machines_of_five_and_right_ones_on_on
         for wrong, made in WRONG.items():
             doubted[wrong] += bool(doubt_of(drawing, measured, made(measured[1]) + noise))
     assert min(doubted.values()) >= 4, doubted
-    right = [recorded(name, 100 + seed) for name in ("five_bar", "rrr") for seed in range(50)]
+    right = [recorded(name, 100 + seed) for name in ("five_bar", "prr") for seed in range(50)]
     assert sum(bool(doubt_of(drawing, measured, measured[1] + noise)) for drawing, measured, noise in right) <= 5
 
 
@@ -285,3 +289,28 @@ def test_refusals_name_what_is_wrong() -> None:
         pf.identify(solution, np.full_like(efforts, np.nan), **how)
     with pytest.raises(pf.errors.InvalidArgument, match="nothing says how good they are"):
         pf.identify(solution[:3], efforts[:3], **{**how, "twists": 0.0 * efforts[0], "accelerations": efforts[:3]})
+
+
+def test_the_command_reads_efforts_beside_a_path_and_writes_the_machine(tmp_path: Path) -> None:
+    machine = weighed(pf.load("delta"), own={"platform": 0.5, "arm1": 0.2, "arm2": 0.2, "arm3": 0.2})
+    t = np.linspace(0.0, 3.0, 300)
+    points = np.stack([30 * np.sin(3 * t), 25 * np.cos(5 * t), -190 + 15 * np.sin(7 * t)], axis=1)
+    efforts = pf.inverse_dynamics(
+        pf.track(machine, points, times=t), loads={"platform": (0.3, (0.0, 0.0, -190.0))}
+    ).actuators
+    (tmp_path / "delta.toml").write_text(dumps(machine))
+    cells = [[f"{value!r}" for value in row] for row in np.column_stack([t, points, efforts]).tolist()]
+    cells[7][-1] = ""
+    header = "time,x,y,z,tau1,effort_A2,effort_A3"
+    (tmp_path / "data.csv").write_text("\n".join([header, *map(",".join, cells)]) + "\n")
+    words = ["identify", tmp_path / "delta.toml", tmp_path / "data.csv", "--body", "platform", "--no-friction"]
+    result = pfabrik([*words, "--columns", "t=time,effort_A1=tau1", "-o", tmp_path / "new.toml", "--json"])
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["parameters"][0]["value"] == pytest.approx(0.8, rel=1e-3)
+    found = {each.body: each.mass for each in pf.load(tmp_path / "new.toml").masses}
+    assert found["platform"] == pytest.approx(0.8, rel=1e-3) and found["arm1"] == pytest.approx(0.2)
+    assert "no column effort_A1" in pfabrik([*words, "--columns", "t=time"]).stderr
+    late = [[*row[:4], *cells[(place + 30) % 300][4:]] for place, row in enumerate(cells)]
+    (tmp_path / "data.csv").write_text("\n".join([header, *map(",".join, late)]) + "\n")
+    result = pfabrik([*words, "--columns", "t=time,effort_A1=tau1"])
+    assert result.exit_code == 1 and "from row to row" in result.stdout + result.stderr
