@@ -275,6 +275,31 @@ def test_wrong_efforts_are_doubted_on_four_machines_of_five_and_right_ones_on_on
     assert sum(bool(doubt_of(drawing, measured, measured[1] + noise)) for drawing, measured, noise in right) <= 5
 
 
+def with_thin_rods(machine: pf.Mechanism, seed: int) -> pf.Mechanism:
+    """Bodies of random masses between their joints, those with two joints as thin rods on the line between these."""
+    random, masses = np.random.default_rng(seed), []
+    for body in machine.bodies[1:]:
+        ends = [np.array(j.at) for j in machine.joints if body in j.connects and j.at is not None]
+        along = ends[1] - ends[0] if len(ends) == 2 else 0.1 * machine.characteristic_length * np.eye(3)
+        mass, second = random.uniform(0.2, 0.5), np.atleast_2d(along).T @ np.atleast_2d(along) / 12.0
+        inertia = mass * (np.trace(second) * np.eye(3) - second)
+        masses.append(pf.Mass(body, mass, np.mean(ends, axis=0), inertia))
+    return machine.with_masses(masses)
+
+
+@pytest.mark.parametrize("name", ["linear_delta", "delta"])
+def test_the_identified_machine_exerts_what_the_fit_says_where_rods_may_spin(name: str) -> None:
+    truth = rubbing(with_thin_rods(pf.load(name), 1), rotor=None)
+    solution, how = wandering(truth, 1)
+    efforts = pf.inverse_dynamics(solution, **how).actuators
+    noise = 0.01 * np.abs(efforts).max() * np.random.default_rng(0).standard_normal(efforts.shape)
+    drawing = rubbing(with_thin_rods(pf.load(name), 2), None, None)
+    result = pf.identify(moved(drawing, solution), efforts + noise, **how)
+    exerted = pf.inverse_dynamics(moved(result.mechanism, solution), **how).actuators
+    np.testing.assert_allclose(efforts + noise - exerted, result.residuals, atol=1e-6 * np.std(noise))
+    np.testing.assert_allclose(result.rms, np.std(noise), rtol=0.25)
+
+
 def test_refusals_name_what_is_wrong() -> None:
     machine = weighed(pf.load("five_bar"))
     solution, how = wandering(machine, 1, 20)
