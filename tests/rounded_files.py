@@ -177,3 +177,54 @@ def model_text(linkage: Linkage, digits: int = 17, turned: str = "quat", scale: 
         f"<worldbody>{body('world')}</worldbody><equality>{''.join(equalities)}</equality>"
         f"<actuator>{motors}</actuator></mujoco>"
     )
+
+
+BASE, ARM, ROD, PLATFORM, APART = 0.028, 0.05, 0.093, 0.02, 0.0125
+"""A rotary delta [m]: radius of its motors, arms, rods, radius of the platform's balls, and half of what two rods of a
+pair are apart."""
+
+
+def delta_description(decimals: int) -> tuple[str, dict[str, list]]:
+    """A delta as a robot description and its loops, with three slides on which the platform hangs; not closed at zero.
+
+    Its rods are loops that are more than enough: six hold the platform's three turns, where three would do.
+    """
+
+    def numbers(values: Sequence[float] | np.ndarray) -> str:
+        return " ".join(f"{value + 0.0:.{decimals}f}" for value in values)
+
+    def joint(name: str, kind: str, parent: str, child: str, axis: str, at: Sequence[float], turn: float = 0.0) -> str:
+        place = f'<origin xyz="{numbers(at)}" rpy="{numbers([0.0, 0.0, turn])}"/><axis xyz="{axis}"/>'
+        ends = f'<parent link="{parent}"/><child link="{child}"/>'
+        limit = f'<limit lower="-2" upper="{0 if name == "pz" else 2}" effort="1" velocity="1"/>'  # the platform hangs
+        return f'<link name="{child}"/><joint name="{name}" type="{kind}">{ends}{place}{limit}</joint>'
+
+    slides = [("pz", "base", "c1", "0 0 1"), ("px", "c1", "c2", "1 0 0"), ("py", "c2", "platform", "0 1 0")]
+    parts = [joint(name, "prismatic", *ends, axis, [0.0] * 3) for name, *ends, axis in slides]
+    loops = []
+    for leg, angle in enumerate(np.radians([0.0, 120.0, -120.0])):
+        outward, across = np.array([np.cos(angle), np.sin(angle), 0.0]), np.array([-np.sin(angle), np.cos(angle), 0.0])
+        parts.append(joint(f"motor{leg}", "revolute", "base", f"arm{leg}", "0 1 0", BASE * outward, angle))
+        for side in (-1.0, 1.0):
+            mark = f"{leg}{'ab'[side > 0.0]}"
+            at = [ARM, side * APART, 0.0]
+            parts.append(joint(f"u{mark}", "continuous", f"arm{leg}", f"cross{mark}", "0 1 0", at))
+            parts.append(joint(f"v{mark}", "continuous", f"cross{mark}", f"rod{mark}", "0 0 1", [0.0] * 3))
+            ball = [float(word) for word in numbers(PLATFORM * outward + side * APART * across).split()]
+            loops.append({"name": f"ball{mark}", "type": "ball", "links": [f"rod{mark}", "platform"]})
+            loops[-1]["at"] = [[ROD, 0.0, 0.0], ball]
+    text = f'<robot name="delta"><link name="base"/>{"".join(parts)}</robot>'
+    return text, {"loops": loops, "actuated": ["motor0", "motor1", "motor2"]}
+
+
+def delta_position(angles: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Where the delta's platform is: the lower point where the spheres of its rods meet, moved in by the platform."""
+    ways = np.radians([0.0, 120.0, -120.0])
+    out = BASE - PLATFORM + ARM * np.cos(angles)
+    centres = np.column_stack([out * np.cos(ways), out * np.sin(ways), -ARM * np.sin(angles)])
+    planes, squares = 2.0 * (centres[1:] - centres[0]), (centres**2).sum(axis=1)
+    way = np.cross(*planes)
+    foot = np.linalg.lstsq(planes, squares[1:] - squares[0], rcond=None)[0]
+    b, c = way @ (foot - centres[0]), (foot - centres[0]) @ (foot - centres[0]) - ROD**2
+    ends = [foot + way * (-b + sign * np.sqrt(b**2 - way @ way * c)) / (way @ way) for sign in (1.0, -1.0)]
+    return min(ends, key=lambda end: end[2])

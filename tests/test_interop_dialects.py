@@ -11,8 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pfabrik as pf
+from command import pfabrik
 from in_mujoco import Model, agrees, notes_of
-from pfabrik.errors import InvalidArgument, InvalidMechanism
+from pfabrik.errors import InvalidArgument, InvalidMechanism, UnknownName
 from pfabrik.exchange.interop import from_sdf, from_urdf, verify
 from pfabrik.machine.files import dumps, loads
 
@@ -290,7 +291,7 @@ SPRING = BODIES.format("drake:linear_spring_damper_", ONE, OTHER)
         ("</robot>", f"<gazebo><joint name='E' type='gearbox'>{IN_SDF}</joint></gazebo></robot>", "type 'gearbox'"),
         ("</robot>", "<xacro:include filename='a'/></robot>", "of a file for xacro"),
         ("<link name", "<link/>" * 300_000 + "<link name", "too many"),
-        ("<link name", "".join(f'<joint name="{i}"/>' for i in range(6000)) + "<link name", "joints; expected at most"),
+        ("<link name", "".join(f'<joint name="{i}"/>' for i in range(6000)) + "<link name", "joints, with all"),
         ('name="crank"', 'name="rocker"', "'rocker': found a name that is empty, or used twice"),
         ('name="D" type="continuous"', 'name="D" type="fixed"', "'rocker', which is fixed to 'ground'"),
     ],
@@ -432,3 +433,71 @@ def test_a_mimic_of_sdf_counts_from_its_reference_and_is_refused_where_no_loop_e
     series = text.replace("<parent>world</parent><child>rocker</child>", "<parent>crank</parent><child>rocker</child>")
     with pytest.raises(InvalidMechanism, match=r"follows 'A' at the ratio 2 .* --actuated|--fixed"):
         from_sdf(re.sub(r'<joint name="C".*?</joint>', "", series), end_effector="rocker")
+
+
+def cross_description(at: str = "0 0 0") -> tuple[str, dict]:
+    """An ankle whose pitch and roll are hinges that cross, with two motors that push its foot by rods."""
+
+    def joint(name: str, parent: str, child: str, place: str, axis: str) -> str:
+        ends = f'<parent link="{parent}"/><child link="{child}"/><origin xyz="{place}"/><axis xyz="{axis}"/>'
+        limit = '<limit lower="-1" upper="1" effort="40" velocity="9"/>'
+        return f'<link name="{child}"/><joint name="{name}" type="revolute">{ends}{limit}</joint>'
+
+    parts = [joint("pitch", "shank", "cross", at, "0 1 0"), joint("roll", "cross", "foot", "0 0 0", "1 0 0")]
+    loops = []
+    for mark, side in (("L", 0.03), ("R", -0.03)):
+        parts.append(joint(f"motor{mark}", "shank", f"crank{mark}", f"0 {side} 0.25", "0 1 0"))
+        parts.append(joint(f"u{mark}", f"crank{mark}", f"pin{mark}", "-0.04 0 0", "0 1 0"))
+        parts.append(joint(f"v{mark}", f"pin{mark}", f"rod{mark}", "0 0 0", "1 0 0"))
+        ends = {"links": [f"rod{mark}", "foot"], "at": [[0.0, 0.0, -0.25], [-0.04, side, 0.0]]}
+        loops.append({"name": f"tip{mark}", "type": "ball", **ends})
+    text = f'<robot name="ankle"><link name="shank"/>{"".join(parts)}</robot>'
+    return text, {"loops": loops, "actuated": ["motorL", "motorR"]}
+
+
+def test_joints_that_become_one_keep_the_names_that_their_file_has(tmp_path: Path) -> None:
+    text, loops = cross_description()
+    ankle = from_urdf(text, loops, end_effector="foot").mechanism
+    assert ankle.joint("pitch") is ankle.joint("roll") is ankle.joint("pitch+roll")
+    angles = np.array([[0.1, -0.2], [0.0, 0.15]])
+    own, merged = (pf.actuation(ankle, joints=names) for names in (("pitch", "roll"), ("pitch+roll",)))
+    assert own.names == ("pitch", "roll")
+    motors = own.to_actuators(angles).values
+    assert np.array_equal(motors, merged.to_actuators(angles).values)
+    for angle, motor in zip(angles, motors, strict=True):  # a foot that turns by pitch, then by roll, is where they say
+        turned = pf.solve_fk(ankle, motor).pose[:3, :3]
+        assert turned == pytest.approx(Rotation.from_euler("YX", angle).as_matrix(), abs=1e-8)
+    with pytest.raises(InvalidArgument, match="'roll' twice"):
+        pf.actuation(ankle, joints=("pitch+roll", "roll"))
+    with pytest.raises(InvalidArgument, match="no coordinate"):
+        pf.actuation(ankle, joints=("pitch",))
+    assert ankle.with_limits({"roll": (-0.5, 0.4)}).joint("pitch").range == ((-1.0, 1.0), (-0.5, 0.4))
+    both = ankle.with_limits(pitch=(-0.2, 0.1), roll=(-0.5, 0.4))
+    assert both.joint("roll").range == ((-0.2, 0.1), (-0.5, 0.4))
+    with pytest.raises(InvalidArgument, match="a range; None or a cone is for 'pitch"):
+        ankle.with_limits(roll=None)
+    answer = pf.solve_fk(ankle, motors[0])
+    assert str(pf.transmission(answer, joint="roll")) == str(pf.transmission(answer, joint="pitch+roll"))
+    file = tmp_path / "ankle.toml"
+    pf.save(ankle, file)
+    words = ["export", str(file), "--numpy", str(tmp_path / "ankle.py"), "--joints", "pitch,roll"]
+    assert pfabrik(words).exit_code == 0
+    with pytest.raises(UnknownName) as refusal:
+        pf.actuation(ankle, joints=("pitsch",))
+    assert refusal.value.__context__ is None  # one traceback, not two
+
+
+def test_numbers_of_an_import_have_the_digits_that_their_file_has() -> None:
+    """What is summed on the way to a joint is written as the sum, and not as what floating point makes of it."""
+    text = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
+    <joint name="p" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0.1 0.07 0.2"/><axis xyz="0 1 0"/>
+      <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+    <joint name="q" type="revolute"><parent link="b"/><child link="c"/>
+      <origin xyz="0.2 0.03 0.14" rpy="0 0 1.5707963267948966"/><axis xyz="0 1 0"/>
+      <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    for unit, factor in (("m", 1.0), ("mm", 1000.0)):
+        machine = from_urdf(text, end_effector="c", actuated=["p", "q"], length_unit=unit).mechanism
+        assert machine.joint("q").at == tuple(factor * each for each in (0.3, 0.1, 0.34))
+        assert machine.joint("q").axis == (-1.0, 0.0, 0.0)
+    fine = text.replace("0.14", "0.1400000000001234")
+    assert from_urdf(fine, end_effector="c", actuated=["p", "q"]).mechanism.joint("q").at[2] == 0.2 + 0.1400000000001234

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -445,7 +447,10 @@ FAR = {**PLAIN, "loops": [{**PLAIN["loops"][0], "at": [[0.1, 0.1, 0], [-0.1, 3.0
         (lambda: from_mjcf("<mujoco/>\0"), ["no XML"]),
         (lambda: from_mjcf("<robot/>"), ["expected <mujoco>"]),
         (lambda: from_mjcf(IN_WORLD.format("<body pos='a b c'/>")), ["what MuJoCo does not compile"]),
-        (lambda: from_mjcf(IN_WORLD.format("<replicate count='1000000'><body/></replicate>")), ["1000000 copies"]),
+        (
+            lambda: from_mjcf(IN_WORLD.format("<replicate count='1000000'><body/></replicate>")),
+            ["1000000 bodies"],
+        ),
         (lambda: from_mjcf(IN_WORLD.format("<flexcomp name='f' file='x.msh'/>")), ["flexible"]),
         (lambda: from_mjcf("<mujoco><include file='other.xml'/></mujoco>"), ["no folder"]),
         (lambda: from_urdf(MISSPELT.replace('"-0.05 0 0"', '"-0.05 0"')), ["contineous", "r9", "'-0.05 0'"]),
@@ -795,3 +800,97 @@ def test_sites_that_are_called_closing_close_loops_with_and_without_an_equality(
         sites.replace(equality, equality.replace("/>", ' active="false"/>')), actuated=["qL", "eL"], **asked
     )
     assert "not active is left out: tip" in notes_of(resting) and "closing frames" not in notes_of(resting)
+
+
+HOIST = """
+<mujoco><default><tendon range="0.2 2.5"/></default>
+  <worldbody>
+    <site name="a0" pos="0.8 0.1 1.5"/><site name="b0" pos="-0.4 0.7 1.4"/><site name="c0" pos="-0.4 -0.7 1.6"/>
+    <body name="mast" pos="0 0 0.1"><joint name="lift" type="slide" axis="0 0 1" range="-1 1"/><geom size="0.01"/>
+      <body name="plate" pos="0.1 0 0.6"><joint name="tilt" type="ball"/><geom size="0.1"/>
+        <site name="a1" pos="0.2 0 0.05"/><site name="b1" pos="-0.1 0.15 0"/><site name="c1" pos="-0.1 -0.2 0"/>
+      </body></body>
+  </worldbody>
+  <tendon><spatial name="a" frictionloss="3"><site site="a0"/><site site="a1"/></spatial>
+    <spatial name="b"><site site="b0"/><site site="b1"/></spatial>
+    <spatial name="c"><site site="c0"/><site site="c1"/></spatial></tendon>
+  <actuator><motor name="lifting" joint="lift"/><motor tendon="c" gear="-2" ctrlrange="-5 7"/><motor tendon="b"/>
+    <cylinder tendon="a"/></actuator>
+</mujoco>"""
+"""A plate on a mast, held by three cylinders: straight tendons that actuators pull."""
+
+
+def test_straight_tendons_that_actuators_pull_are_cylinders_as_long_as_in_mujoco() -> None:
+    found = from_mjcf(HOIST, end_effector="plate")
+    machine = found.mechanism
+    assert machine.actuator_names == ("lift", "c", "b", "a")
+    assert sorted(chains(found)) == ["P*-S", "U-P*-S", "U-P*-S", "U-P*-S"]
+    assert machine.joint("c").max_torque == 10.0 and machine.joint("a").friction == (3.0, 0.0)
+    assert machine.joint("b").range == (0.2, 2.5)
+    model = mujoco.MjModel.from_xml_string(HOIST)
+    data = mujoco.MjData(model)
+    for lift, turn in ((0.0, [0.0, 0.0, 0.0]), (0.2, [0.1, -0.2, 0.15]), (-0.3, [-0.2, 0.1, -0.1])):
+        answer = pf.solve_ik(machine, pf.pose([0.1, 0.0, 0.7 + lift], rotvec=turn))
+        assert answer, answer
+        data.qpos[0], size = lift, float(np.linalg.norm(turn))
+        data.qpos[1:] = [np.cos(size / 2), *(np.sin(size / 2) * np.array(turn) / (size or 1.0))]
+        mujoco.mj_forward(model, data)
+        lengths = [data.tendon(name).length[0] for name in ("c", "b", "a")]
+        assert answer.actuators == pytest.approx([lift, *lengths], abs=1e-9)
+
+
+def test_what_drives_a_machine_and_is_not_read_is_never_followed_by_drives_that_nobody_named() -> None:
+    around = HOIST.replace('<site site="a1"/></spatial>', '<site site="a1"/><site site="b1"/></spatial>')
+    around = around.replace('<default><tendon range="0.2 2.5"/></default>', "").replace('<motor tendon="b"/>', "")
+    unread = re.sub(r'<motor name="lifting"[^>]*/><motor[^>]*/>', "", around)
+    with pytest.raises(NoEndEffector) as refusal:
+        from_mjcf(unread)
+    (choice,) = refusal.value.choices
+    assert not choice.options
+    assert "driven by what is not read: a cylinder (through tendon a)" in str(choice)
+
+
+def test_no_more_drives_are_proposed_than_a_machine_has_freedoms() -> None:
+    """A four-bar has three hinges that could be driven, and needs one of them."""
+    still = FOUR_BAR.replace('<motor joint="A"/>', "")
+    error = refused(lambda: from_mjcf(still, end_effector="coupler"))
+    assert "`actuated` (--actuated A); others here: B, C" in str(error)
+
+
+FOUR_BAR = """
+<mujoco><worldbody><site name="ground" pos="0.2 0 0"/>
+  <body name="crank"><joint name="A" axis="0 1 0"/><geom size="0.01"/>
+    <body name="coupler" pos="0 0 0.1"><joint name="B" axis="0 1 0"/><geom size="0.01"/>
+      <body name="rocker" pos="0.2 0 0.05"><joint name="C" axis="0 1 0"/><geom size="0.01"/>
+        <site name="foot" pos="0 0 -0.15"/></body></body></body></worldbody>
+  <equality><connect name="D" site1="foot" site2="ground"/></equality>
+  <actuator><motor joint="A"/></actuator></mujoco>"""
+
+
+def in_urdf(count: int, kind: str) -> str:
+    links = "".join(
+        f'<link name="l{k}"/><joint name="j{k}" type="{kind}"><parent link="base"/><child link="l{k}"/></joint>'
+        for k in range(count)
+    )
+    return f'<robot name="r"><link name="base"/>{links}</robot>'
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("<mujoco><worldbody>" + "<body><joint/></body>" * 4_000 + "</worldbody></mujoco>", "4000 joints"),
+        ("<mujoco><worldbody>" + "<body/>" * 10_000 + "</worldbody></mujoco>", "10000 bodies"),
+        ("<mujoco><equality>" + '<connect body1="a" anchor="0 0 0"/>' * 400 + "</equality></mujoco>", "400 loops"),
+        ("<mujoco><worldbody>" + "<site/>" * 150_000 + "</worldbody></mujoco>", "150000 sites"),
+        (in_urdf(4_000, "revolute"), "4000 joints"),
+        (in_urdf(6_000, "fixed"), "6001 links"),
+        ("<sdf><model>" + "<joint type='ball'/>" * 4_000 + "</model></sdf>", "4000 joints"),
+        ("<mujoco><worldbody>" + "<replicate count='90'>" * 3 + "<site/>" + "</replicate>" * 3, "sites"),
+    ],
+)
+def test_a_model_of_more_parts_than_any_robot_has_is_refused_at_once(text: str, said: str) -> None:
+    text += "</worldbody></mujoco>" if text.endswith("</replicate>") else ""
+    read, before = from_mjcf if text.startswith("<mujoco>") else from_urdf, time.process_time()
+    error = refused(lambda: read(text, end_effector="e"))
+    assert said in str(error) and "at most" in str(error)
+    assert time.process_time() - before < 2.0

@@ -9,6 +9,8 @@ from __future__ import annotations
 import json
 import math
 import re
+import shutil
+import subprocess
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,6 +25,7 @@ from pfabrik.cli import main
 from pfabrik.cli.export import text_of
 from pfabrik.errors import InvalidMechanism, UnsupportedMechanism
 from pfabrik.machine.files import print_region_of
+from pfabrik.machine.files.printers.conditions import definitions
 
 FILES = Path(__file__).parent / "data" / "printers"
 
@@ -324,3 +327,127 @@ def test_a_printers_workspace_begins_at_its_bed_and_says_what_it_leaves_out(tmp_
     assert "print_radius 140" in notes and "z from -5 on, minimum_z_position" in notes
     end, notes = lowest("--within", "z=-100:0")
     assert end < -90.0 and "upper bound" in notes and "z from" not in notes
+
+
+def held_definitions(text: str) -> dict[str, str]:
+    """Names and values that hold at the end of a text of C, by the C preprocessor itself."""
+    command = ["cpp", "-dM", "-undef", "-P", "-"]
+    lines = subprocess.run(command, input=text, capture_output=True, text=True, check=True).stdout.splitlines()
+    words = [line.split(maxsplit=2)[1:] for line in lines]
+    return {word[0]: " ".join(word[1:]) for word in words if not word[0].startswith("_")}
+
+
+def conditions_at_random(rng: np.random.Generator, depth: int = 0) -> list[str]:
+    """Lines that define names as nested conditions on others say; all names are defined somewhere."""
+    names, lines = "ABCDEF", []
+
+    def asked() -> str:
+        one, other = rng.choice([*names], 2)
+        of_names = (
+            f"defined({one}), !defined {one}, defined({one}) && !defined({other}), defined {one} || (defined({other}))"
+        )
+        return str(rng.choice([*of_names.split(", "), "1 > 2", "V == 2", "V != 2 && V < 5", "0"]))
+
+    for _ in range(4):
+        name, number = rng.choice([*names]), int(rng.integers(1, 9))
+        choice = rng.integers(4 if depth < 3 else 2)
+        if choice == 0:
+            lines += [f"#undef {name}", f"  # define {name} {number} // as before"]
+        elif choice == 1:
+            lines += [f"#undef {name}"]
+        else:
+            begin = [f"#if {asked()}", f"#ifdef {name}", f"#ifndef {name}"][rng.integers(3)]
+            middle = [f"#elif {asked()}", *conditions_at_random(rng, depth + 1)] if rng.integers(2) else []
+            end = ["#else /* or */", *conditions_at_random(rng, depth + 1)] if rng.integers(2) else []
+            lines += [begin, *conditions_at_random(rng, depth + 1), *middle, *end, "#endif"]
+    return lines
+
+
+@pytest.mark.skipif(shutil.which("cpp") is None, reason="needs the C preprocessor")
+def test_conditions_are_followed_as_the_c_preprocessor_follows_them() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(40):
+        text = "\n".join(["#define V 3", *conditions_at_random(rng), *(f"//#define {name}" for name in "ABCDEF")])
+        assert definitions(text) == (held_definitions(text), set()), text
+
+
+SIZES = """
+#define DELTA
+//#define SMALL
+#define MODEL 2
+#if {0}
+  #define DELTA_DIAGONAL_ROD 269.0
+  #define DELTA_RADIUS 136.4
+#else
+  #define DELTA_DIAGONAL_ROD 218.0
+  #define DELTA_RADIUS 97.0
+#endif
+#define DELTA_HEIGHT 300.0
+"""
+
+
+@pytest.mark.parametrize(
+    ("asked", "rod"),
+    [
+        ("ENABLED(DELTA)", 269.0),
+        ("DISABLED(DELTA)", 218.0),
+        ("ENABLED(SMALL)", 218.0),
+        ("BOTH(DELTA, SMALL) || MODEL == 2", 269.0),
+        ("EITHER(SMALL, DELTA) && !NONE(DELTA)", 269.0),
+        ("MODEL > 1 && MODEL <= 1", 218.0),
+        ("ENABLED(OF_ANOTHER_FILE) && ENABLED(SMALL)", 218.0),
+    ],
+)
+def test_a_delta_of_two_sizes_in_one_file_of_marlin_is_the_one_that_is_enabled(
+    asked: str, rod: float, tmp_path: Path
+) -> None:
+    (tmp_path / "Configuration.h").write_text(SIZES.format(asked))
+    machine = pf.load(tmp_path / "Configuration.h")
+    arm = np.subtract(machine.joint("lower_al").at, machine.joint("upper_al").at)
+    assert np.linalg.norm(arm) == pytest.approx(rod, abs=EXACT)
+    radius = {269.0: 136.4, 218.0: 97.0}[rod]
+    assert np.hypot(*arm[:2]) == pytest.approx(radius, abs=EXACT)
+
+
+def test_a_size_that_another_file_decides_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "Configuration.h").write_text(SIZES.format("ENABLED(OF_ANOTHER_FILE)"))
+    with pytest.raises(InvalidMechanism, match="two values, and names of another file say which"):
+        pf.load(tmp_path / "Configuration.h")
+
+
+DELTESIAN = """[printer]
+kinematics: deltesian
+[stepper_left]
+position_endstop: 311
+arm_length: 217
+arm_x_length: 160
+[stepper_right]
+{right}
+[stepper_y]
+position_min: {lowest}
+position_max: 210
+"""
+
+
+@pytest.mark.parametrize(
+    ("right", "x_right", "arm_right", "lowest"),
+    [("", 160.0, 217.0, 0.0), ("arm_length: 218.5\narm_x_length: 161.5", 161.5, 218.5, 12.0)],
+)
+def test_a_deltesian_is_where_klipper_has_it(
+    right: str, x_right: float, arm_right: float, lowest: float, tmp_path: Path
+) -> None:
+    """A carriage of Klipper's deltesian is at sqrt(arm² - (x - its x)²) + z; its third stepper counts y."""
+    file = tmp_path / "printer.cfg"
+    file.write_text(DELTESIAN.format(right=right, lowest=lowest))
+    machine = pf.load(file)
+    assert machine.actuator_names == ("carriage_left", "carriage_right", "carriage_y")
+    tops = [machine.joint(name).range[1] for name in ("carriage_left", "carriage_right")]
+    assert tops == pytest.approx([311 + np.sqrt(217**2 - 160**2), 311 + np.sqrt(arm_right**2 - x_right**2)])
+    for x, y, z in ((0, 12, 0), (50, 40, 100), (-50, 209, 10), (20, 90, 250)):
+        answer = pf.solve_ik(machine, [x, y, z])
+        left, right_ = np.sqrt(217**2 - (x + 160) ** 2) + z, np.sqrt(arm_right**2 - (x - x_right) ** 2) + z
+        assert answer and answer.actuators == pytest.approx([left, right_, y], abs=EXACT * 100)
+        assert pf.solve_fk(machine, answer.actuators).pose[:3, 3] == pytest.approx([x, y, z], abs=1e-6)
+    file.write_text(DELTESIAN.format(right="", lowest=300))
+    with pytest.raises(InvalidMechanism, match="position_max: found 210"):
+        pf.load(file)

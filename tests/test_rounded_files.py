@@ -15,9 +15,17 @@ from command import pfabrik
 from in_mujoco import Model, notes_of
 from oracles import any_values
 from pfabrik.errors import UnknownName
-from pfabrik.exchange.interop import Imported, from_mjcf, to_mjcf, verify
+from pfabrik.exchange.interop import Imported, from_mjcf, from_urdf, to_mjcf, verify
 from pfabrik.exchange.interop.digits import digits_of
-from rounded_files import LINKAGES, Linkage, model_text, planar_four_bar, spherical_three_legs
+from rounded_files import (
+    LINKAGES,
+    Linkage,
+    delta_description,
+    delta_position,
+    model_text,
+    planar_four_bar,
+    spherical_three_legs,
+)
 
 pytestmark = pytest.mark.filterwarnings("ignore::pfabrik.errors.MobilityWarning")
 
@@ -50,6 +58,9 @@ WRITTEN = [
     ("spherical", 6, "euler", 1.0),
     ("mixture", 6, "xyaxes", 1.0),
     ("spherical", 6, "quat", 1e3),
+    ("planar", 3, "quat", 1.0),
+    ("third rod", 5, "euler", 1.0),
+    ("third rod", 4, "xyaxes", 1.0),
 ]
 """Linkages, the digits of their files, how bodies are turned there, and the unit of length over a metre."""
 
@@ -139,6 +150,31 @@ def test_the_last_digit_of_a_file_is_found(texts: list[str], value: float, error
     assert digits_of(texts).error([value]) == pytest.approx(error, abs=1e-16)
     quarter = digits_of(["0.123456789012345 1.1234567890123456", "1.5708"])  # rounded wherever it stands
     assert quarter.error([1.5708], 3) == pytest.approx(0.5e-4)
+
+
+@pytest.mark.parametrize("decimals", [3, 4, 5, 6, 7, 9, 10, 12, 16])
+def test_a_machine_with_more_rods_than_it_needs_moves_whatever_the_digits_of_its_file(decimals: int) -> None:
+    """Pairs of rods are parallelograms only if the digits let them be; the closed form knows nothing of pairs."""
+    text, loops = delta_description(decimals)
+    found = from_urdf(text, loops, end_effector="platform")
+    assert pf.mobility(found.mechanism).mobility == 3
+    assert "move nothing" not in notes_of(found) and "moves anything" not in notes_of(found)
+    for angles in np.radians([[30.0, 45.0, 60.0], [10.0, 0.0, 0.0], [70.0, 20.0, 50.0]]):
+        answer = pf.solve_fk(found.mechanism, angles)
+        assert answer, answer
+        assert np.abs(answer.pose[:3, 3] - delta_position(angles)).max() <= 10.0 * 10.0**-decimals + 1e-12
+
+
+def test_an_import_says_where_no_drive_moves_anything() -> None:
+    """A linkage of four skew hinges moves for its proportions alone, of which three digits leave nothing."""
+    linkage = LINKAGES["bennett"]()
+    said = notes_of(imported(linkage, model_text(linkage, 3)))
+    assert (
+        "no drive moves anything: forward kinematics does not follow 10 deg, or a tenth of a range, from home: h0"
+        in said
+    )
+    for digits in (5, 17):
+        assert "no drive moves" not in notes_of(imported(linkage, model_text(linkage, digits)))
 
 
 def spoiled(by: float) -> pf.Mechanism:

@@ -59,7 +59,7 @@ def read_measurements(path: str | PathLike[str], mechanism: Mechanism, *, sigma:
             raise InvalidArgument("path", f"column '{column}', an angle", f"{name}, a length")
         columns[name] = np.radians(values) if column.endswith("_deg") or column in ANGLES else values
     _check_names(columns, mechanism)
-    sensors = [n for n in mechanism.coordinate_names if n in columns and n not in mechanism.actuator_names]
+    sensors = [n for n in mechanism.coordinates_by_name if n in columns and n not in mechanism.actuator_names]
     return Measurements(
         np.stack([columns[name] for name in mechanism.actuator_names], axis=1),
         position=_position(columns),
@@ -89,7 +89,7 @@ def _check_names(columns: dict[str, Floats], mechanism: Mechanism) -> None:
     missing = [name for name in mechanism.actuator_names if name not in columns]
     if missing:
         raise InvalidArgument("path", f"no column {', '.join(missing)}", "one for each actuator of the machine")
-    known = [*mechanism.coordinate_names, *POSITION, *ANGLES, *QUATERNION, HEIGHT, DISTANCE, DISTANCE_TO]
+    known = [*mechanism.coordinates_by_name, *POSITION, *ANGLES, *QUATERNION, HEIGHT, DISTANCE, DISTANCE_TO]
     unknown = [name for name in columns if name not in known]
     if unknown:
         expected = "actuators, other coordinates, x, y, z, roll, pitch, yaw, height, distance and distance_to"

@@ -200,8 +200,8 @@ class Fit:
 
 def _sensor_columns(machine: Mechanism, measurements: Measurements) -> Mapping[str, int]:
     """The column of every coordinate that a sensor reads."""
-    measurements.check_for(machine.actuator_names, machine.coordinate_names)
-    coordinates = {coordinate.name: coordinate for coordinate in machine.coordinates}
+    coordinates = machine.coordinates_by_name
+    measurements.check_for(machine.actuator_names, [*coordinates])
     for name in measurements.joints:
         if coordinates[name].joint.type == "spherical":
             raise InvalidArgument("joints", f"'{name}', of a spherical joint", "coordinates that a sensor reads")

@@ -372,9 +372,7 @@ def _with_limits_of(mechanism: Mechanism, limits: Any) -> Mechanism:
     """The mechanism with the limits of some joints only."""
     if limits is None:
         return mechanism
-    names = set(require_names("limits", limits))
-    for name in names:
-        mechanism.joint(name)
+    names = {mechanism.joint(name).name for name in require_names("limits", limits)}
     others = {
         joint.name: None
         for joint in mechanism.joints

@@ -171,7 +171,7 @@ def transmission(solution: Solution, joint: str | None = None) -> Transmission:
     maps = maps_of(solution)
     rates, turns = maps.forward.copy(), np.arange(maps.forward.shape[1]) >= 3
     if joint is not None:
-        mechanism.joint(joint)
+        joint = mechanism.joint(joint).name
         turns = np.array([each.kind == "angle" for each in mechanism.coordinates])[columns(mechanism)[joint]]
         rates = _of_joint(solution, maps, joint)
     reasons = maps.reasons

@@ -30,8 +30,9 @@ from .imported_masses import with_masses
 from .imported_shapes import with_collision
 from .notes import Note, note_names, noting
 from .opened import OpenMechanism
+from .short_numbers import short_joint, shortened
 from .simplify import combined, merged_balls, merged_bodies
-from .straighten import straighten
+from .straighten import straighten, unlocked
 
 SHOWN = 0.01
 """Share of the largest component of a gap from which another is shown."""
@@ -115,9 +116,18 @@ def closed(opened: OpenMechanism, notes: list[Note]) -> Assembled:
     rigid, stands_for = merged_bodies(merged_balls(structure.joints), opened.base, opened.end_effector)
     exact = straighten(rigid, opened, reference, slack, notes)
     simple = combined(exact, {opened.base, opened.end_effector}, notes)
-    limited = [dataclasses.replace(each, cone=opened.cones.get(each.name, each.cone)) for each in simple]
+    moving = unlocked(simple, opened, reference, slack, notes)
+    limited = [short_joint(_told(joint, opened), loops.length) for joint in moving]
+    reference = None if reference is None else shortened(reference, loops.length)
     collision = _moved_collision(opened, loops.tree, home).merged(stands_for)
     return Assembled(_mechanism(opened, limited, reference, notes), gap * loops.length, collision)
+
+
+def _told(joint: Joint, opened: OpenMechanism) -> Joint:
+    """A joint with its cone, or as the distance between two joints, where the description says so."""
+    if joint.name in opened.spans:
+        return dataclasses.replace(joint, axis=None, home=0.0, along=opened.spans[joint.name])
+    return dataclasses.replace(joint, cone=opened.cones.get(joint.name, joint.cone))
 
 
 def _closed_home(opened: OpenMechanism, loops: OpenLoops, notes: list[Note]) -> tuple[ClosedHome, OpenMechanism]:

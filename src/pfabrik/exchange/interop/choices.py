@@ -12,11 +12,12 @@ from ...errors import InvalidArgument, PfabrikError, counted
 from ...kinematics import column_joints, tree_of
 from ...machine.description.graph import Edge, spanning_tree
 from ...machine.description.home_mobility import body_twist
-from ...machine.description.joints import KINDS, Joint
+from ...machine.description.joints import Joint
 from ...machine.description.mechanism import Mechanism
 from ...machine.motion.loops import actuated_columns, first_order, present_screws, right_singular
 from ...machine.motion.mobility import around_home
 from ...tolerances import TOLERANCES
+from .driving import candidates
 from .opened import Loop
 from .simplify import edges_between, loop_blocks
 
@@ -110,12 +111,15 @@ class NoEndEffector(InvalidArgument):
         super().__init__("end_effector", "none", expected)
 
 
-def choices_of(joints: Sequence[Joint], loops: Sequence[Loop], base: str, build: Build) -> list[Choice]:
+def choices_of(
+    joints: Sequence[Joint], loops: Sequence[Loop], base: str, build: Build, unread: str = ""
+) -> list[Choice]:
     """The parts of a robot that loops hold together, each against its body nearest to the base; then open ends.
 
     Parameters
     ----------
     joints, loops : between bodies of which those welded to each other are one.
+    unread : what drives the robot and is not read, if anything is: no drives are made up in its place.
     """
     edges = edges_between(joints, loops)
     tree = spanning_tree(edges, base)
@@ -128,14 +132,14 @@ def choices_of(joints: Sequence[Joint], loops: Sequence[Loop], base: str, build:
         names = tuple(edges[index].joint.name for index in block if index >= len(joints))
         ends = sorted(inside[1:], key=lambda body: (-degrees[body], -depth[body]))
         drivable = [edges[index].joint for index in block if index < len(joints)]
-        found.append(_choice(inside[0], ends, drivable, names, build))
+        found.append(_choice(inside[0], ends, drivable, names, build, unread))
     start = _start(edges, base, {index for block in blocks for index in block})
     ends = [each.end_effector for each in found if each.end_effector and each.base != start]
     ends += [body for body in tree.paths if degrees[body] == 1 and body not in (base, start)]
     ways = {end: {index for index, _ in tree.way(end)} for end in ends}
     last = [end for end in ways if not any(ways[end] < way for way in ways.values())]
     for end in sorted(last, key=lambda body: -depth[body])[:MOST_WHOLE]:
-        found.append(_choice(start, [end], joints, (), build))
+        found.append(_choice(start, [end], joints, (), build, unread))
     return [each for each in found if each.end_effector] or found
 
 
@@ -151,14 +155,18 @@ def _start(edges: Sequence[Edge], base: str, looped: set[int]) -> str:
     return base
 
 
-def _choice(base: str, ends: list[str], joints: Sequence[Joint], loops: tuple[str, ...], build: Build) -> Choice:
+def _choice(
+    base: str, ends: list[str], joints: Sequence[Joint], loops: tuple[str, ...], build: Build, unread: str
+) -> Choice:
     """What bodies of a part are moved by, and those of them that make a mechanism as end effectors."""
     drives: tuple[str, ...] | None = None
     refusals = []
     for end in ends[:MOST_TRIED]:
         try:
             if not any(joint.driven for joint in joints):
-                drives = _enough(base, end, joints, build)
+                if unread:
+                    return Choice(base, loops, refusal=f"driven by what is not read: {unread}")
+                drives = enough_drives(base, end, joints, build)
             machine = build(base, end, drives)
             moved = {each.body: each for each in moved_bodies(machine) if each.freedoms and each.actuators}
             order = sorted((body for body in ends if body in moved), key=lambda body: -len(moved[body].actuators))
@@ -166,17 +174,16 @@ def _choice(base: str, ends: list[str], joints: Sequence[Joint], loops: tuple[st
         except PfabrikError as error:
             refusals.append(f"'{end}' is refused: {str(error).splitlines()[0]}")
         else:
-            return Choice(base, loops, best, drives, tuple(moved[body] for body in order))
+            remains = "" if order else "no drive moves any of its bodies"
+            return Choice(base, loops, best, drives, tuple(moved[body] for body in order), remains)
     return Choice(base, loops, refusal=refusals[0] if refusals else "nothing moves")
 
 
-def _enough(base: str, end: str, joints: Sequence[Joint], build: Build) -> tuple[str, ...]:
-    """Joints that drive all of a part that has no drives, those at the base first."""
-    candidates = [joint for joint in joints if KINDS[joint.type].actuatable]
-    candidates.sort(key=lambda joint: base not in joint.connects)
-    known = [joint.name for joint in candidates]
+def enough_drives(base: str, end: str, joints: Sequence[Joint], build: Build) -> tuple[str, ...]:
+    """Joints that drive all of a part that has no drives, those at the base first; as many as it has freedoms."""
+    known = [joint.name for joint in candidates(joints, base)]
     machine = build(base, end, known)
-    motions = _motions(machine)[0][actuated_columns(machine)]
+    motions = generic_motions(machine)[0][actuated_columns(machine)]
     drives: list[int] = []
     for place in range(len(motions)):
         if _rank(motions[[*drives, place]]) > len(drives):
@@ -190,7 +197,7 @@ def moved_bodies(mechanism: Mechanism) -> Iterator[Moved]:
 
     An actuator moves a body that has more freedoms while this actuator moves and the others rest than with all at rest.
     """
-    motions, screws = _motions(mechanism)
+    motions, screws = generic_motions(mechanism)
     drives, owners = motions[actuated_columns(mechanism)], column_joints(mechanism)
     resting, alone = _null_space(drives), np.linalg.pinv(drives, TOLERANCES.alignment)
     moves = np.diag(drives @ alone) > 1.0 - TOLERANCES.alignment  # else it rests where the others do
@@ -204,7 +211,7 @@ def moved_bodies(mechanism: Mechanism) -> Iterator[Moved]:
         yield Moved(body, _rank(twist), undriven, tuple(by))
 
 
-def _motions(mechanism: Mechanism) -> tuple[Floats, Floats]:
+def generic_motions(mechanism: Mechanism) -> tuple[Floats, Floats]:
     """Independent motions (c, k) of all joints at a generic configuration, and the screws (c, 6) there.
 
     Of configurations that are as good, home comes last: a chain that is straight has fewer freedoms.

@@ -24,24 +24,30 @@ class Rates(NamedTuple):
     friction: tuple[float, float] | None = None
 
 
-def require_drives(opened: OpenMechanism, joints: Sequence[Joint], undriven: str) -> None:
-    """Refuse a machine with no driven joint between base and end effector, with the reason and the candidates.
+def no_drives(opened: OpenMechanism, joints: Sequence[Joint], undriven: str, enough: Sequence[str]) -> InvalidMechanism:
+    """The refusal of a machine with no driven joint between base and end effector, with the reason and a remedy.
 
     Parameters
     ----------
     joints, undriven : all joints of the robot, and what its file has in place of driven ones.
+    enough : joints that drive all of its freedoms, if they are known.
     """
-    if any(joint.driven for joint in opened.joints):
-        return
     elsewhere = [joint.name for joint in joints if joint.driven]
     why = f"drives elsewhere only: {', '.join(elsewhere)}" if elsewhere else undriven
-    candidates = [joint for joint in opened.joints if KINDS[joint.type].actuatable]
-    candidates.sort(key=lambda joint: opened.base not in joint.connects)
-    names = ", ".join(joint.name for joint in candidates) or "none, for nothing here can be driven"
-    expected = f"the driven joints by name, `actuated` (--actuated A,B,...), from the base outward: {names}"
-    raise InvalidMechanism(
-        [Fault("actuated joints", f"none between '{opened.base}' and '{opened.end_effector}': {why}", expected)]
-    )
+    names = [joint.name for joint in candidates(opened.joints, opened.base)]
+    others = [name for name in names if name not in enough]
+    if enough:
+        way = f"(--actuated {','.join(enough)})" + (f"; others here: {', '.join(others)}" if others else "")
+    else:
+        listed = ", ".join(names) or "none, for nothing here can be driven"
+        way = f"(--actuated A,B,...), from the base outward: {listed}"
+    found = f"none between '{opened.base}' and '{opened.end_effector}': {why}"
+    return InvalidMechanism([Fault("actuated joints", found, f"the driven joints by name, `actuated` {way}")])
+
+
+def candidates(joints: Sequence[Joint], base: str) -> list[Joint]:
+    """The joints that can be driven, those at the base first."""
+    return sorted((each for each in joints if KINDS[each.type].actuatable), key=lambda each: base not in each.connects)
 
 
 def with_actuators(mechanism: Mechanism, order: Sequence[str], rates: Mapping[str, Rates], metres: float) -> Mechanism:

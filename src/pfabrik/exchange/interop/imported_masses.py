@@ -13,6 +13,7 @@ from ...machine.description.body_masses import as_matrix, as_moments
 from ...machine.description.mechanism import Mass, Mechanism
 from ...machine.description.whole_rules import is_impossible
 from .notes import Note, note_names
+from .short_numbers import shortened
 
 
 def placed_mass(body: str, mass: float, frame: Floats, inertia: Floats) -> Mass:
@@ -57,7 +58,9 @@ def with_masses(mechanism: Mechanism, masses: Iterable[Mass], known: Collection[
         solids = [BodyInertia(each.mass, np.array(each.centre), _inertia(each)) for each in own]
         if solids:
             whole = joined(solids)
-            found.append(Mass(body, whole.mass, whole.centre, as_moments(whole.inertia)))
+            centre = shortened(whole.centre, mechanism.characteristic_length)
+            moments = np.array(as_moments(whole.inertia))
+            found.append(Mass(body, whole.mass, centre, shortened(moments, float(np.abs(moments).max()))))
         elif body != mechanism.base and (body in parts or body not in known):
             found.append(Mass(body, 0.0))
     note_names(notes, "moments of inertia that no body has are left out: its mass is a point, of", strange)

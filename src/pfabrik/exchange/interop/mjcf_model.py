@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -20,7 +21,7 @@ from .driving import Rates
 from .names import unique
 from .notes import Note, note_names
 from .opened import Loop
-from .urdf_links import friction_of
+from .xml_fields import friction_of
 from .xml_reading import fault
 
 NEWTON_STEPS = 30
@@ -130,19 +131,38 @@ class MjcfModel(CompiledModel):
         """Name of a joint; a number where it has none."""
         return self.joint_names[index] or f"joint_{index}"
 
+    def tendon(self, index: int) -> str:
+        """Name of a tendon; a number where it has none."""
+        return str(self.model.tendon(index).name) or f"tendon_{index}"
+
+    def note_rounding(self, names: Iterable[str], sites: Iterable[int]) -> None:
+        """Have joints and loops placed as exactly as the worst of some sites."""
+        self.roundings |= dict.fromkeys(names, worst(map(self._digits.site, sites)))
+
+    @cached_property
+    def targets(self) -> Ints:
+        """What each actuator drives, (nu,): the index of a joint, or of a tendon, which come behind all joints."""
+        is_tendon = self.model.actuator_trntype == self.mujoco.mjtTrn.mjTRN_TENDON
+        return np.asarray(self.model.actuator_trnid[:, 0] + is_tendon * self.model.njnt)
+
+    @cached_property
+    def target_names(self) -> list[str]:
+        """Names of joints, then of tendons."""
+        return [*map(self.joint, range(self.model.njnt)), *map(self.tendon, range(self.model.ntendon))]
+
     @property
     def driven(self) -> list[str]:
-        """Names of the joints that are driven, in the order of the actuators."""
-        return [self.joint(int(index)) for index in self.model.actuator_trnid[:, 0]]
+        """Names of the joints and tendons that are driven, in the order of the actuators."""
+        return [self.target_names[target] for target in self.targets]
 
     def rates(self, notes: list[Note]) -> dict[str, Rates]:
-        """The armature and the friction of each joint, and the most that its actuators exert, by its name."""
+        """The armature and the friction of each joint and tendon, and the most that actuators exert, by its name."""
         model = self.model
-        own = np.array([model.dof_armature, model.dof_frictionloss, model.dof_damping])[:, model.jnt_dofadr]
-        forces, found, uneven = self._forces(), {}, []
-        of_joints = (own + self._of_actuators()).T.tolist()
-        for index, ((low, high), (armature, dry, viscous)) in enumerate(zip(forces, of_joints, strict=True)):
-            name, most = self.joint(index), float(min(-low, high))
+        of_joints = np.array([model.dof_armature, model.dof_frictionloss, model.dof_damping])[:, model.jnt_dofadr]
+        of_tendons = np.array([model.tendon_armature, model.tendon_frictionloss, model.tendon_damping])
+        said, found, uneven = np.hstack([of_joints, of_tendons]) + self._of_actuators(), {}, []
+        for name, (low, high), own in zip(self.target_names, self._forces(), said.T.tolist(), strict=True):
+            most, (armature, dry, viscous) = float(min(-low, high)), own
             found[name] = Rates(
                 max_torque=most if 0.0 < most < np.inf else None,
                 rotor_inertia=armature or None,
@@ -152,31 +172,31 @@ class MjcfModel(CompiledModel):
         note_names(notes, "actuators exert more one way: the smaller limit counts, none where it is 0, of", uneven)
         curved = [getattr(model, f"{each}_dampingpoly", np.zeros((0, 0))).any(axis=1) for each in ("dof", "actuator")]
         names = [self.joint(int(model.dof_jntid[dof])) for dof in np.flatnonzero(curved[0])]
-        names += [self.joint(int(model.actuator_trnid[k, 0])) for k in np.flatnonzero(curved[1])]
+        names += [self.driven[k] for k in np.flatnonzero(curved[1])]
         note_names(notes, "damping by powers of the rate is left out, of", dict.fromkeys(names))
         return found
 
     def _of_actuators(self) -> Floats:
-        """Armature, dry friction and damping that the actuators of each joint add to its own, (3, njnt)."""
-        model, added = self.model, np.zeros((3, self.model.njnt))
+        """Armature, dry friction and damping that the actuators of each target add to its own, (3, targets)."""
+        model, added = self.model, np.zeros((3, len(self.target_names)))
         squares = model.actuator_gear[:, 0] ** 2
         for row, name in ((0, "actuator_armature"), (2, "actuator_damping")):  # since MuJoCo 3.4
-            np.add.at(added[row], model.actuator_trnid[:, 0], squares * getattr(model, name, np.zeros(model.nu)))
+            np.add.at(added[row], self.targets, squares * getattr(model, name, np.zeros(model.nu)))
         return added
 
     def _forces(self) -> Floats:
-        """The lowest and the highest force of the actuators on each joint, (njnt, 2) [N, N m]; infinite without."""
+        """The lowest and the highest force of the actuators on each target, (targets, 2) [N, N m]; else infinite."""
         model, mujoco = self.model, self.mujoco
-        found = np.tile([-np.inf, np.inf], (model.njnt, 1))
-        found[model.actuator_trnid[:, 0]] = 0.0
-        for k, joint in enumerate(model.actuator_trnid[:, 0]):
+        found = np.tile([-np.inf, np.inf], (len(self.target_names), 1))
+        found[self.targets] = 0.0
+        for k, target in enumerate(self.targets):
             ends = model.actuator_forcerange[k] if model.actuator_forcelimited[k] else np.array([-np.inf, np.inf])
             is_fixed = model.actuator_gaintype[k] == mujoco.mjtGain.mjGAIN_FIXED
             is_alone = model.actuator_biastype[k] == mujoco.mjtBias.mjBIAS_NONE
             is_force = is_fixed and is_alone and model.actuator_dyntype[k] != mujoco.mjtDyn.mjDYN_INTEGRATOR
             if is_force and model.actuator_ctrllimited[k]:
                 ends = np.clip(np.sort(model.actuator_gainprm[k, 0] * model.actuator_ctrlrange[k]), *ends)
-            found[joint] += np.sort(model.actuator_gear[k, 0] * ends)
+            found[target] += np.sort(model.actuator_gear[k, 0] * ends)
         for joint in np.flatnonzero(model.jnt_actfrclimited):
             found[joint] = np.clip(found[joint], *model.jnt_actfrcrange[joint])
         return found
@@ -227,7 +247,7 @@ class MjcfModel(CompiledModel):
             "type": "revolute" if is_hinge else "prismatic",
             "at": at if is_hinge else None,
             "axis": axis,
-            "actuated": index in model.actuator_trnid[:, 0],
+            "actuated": index in self.targets,
             "home": float(data.qpos[address]),
             "range": model.jnt_range[index].tolist() if model.jnt_limited[index] else None,
         }

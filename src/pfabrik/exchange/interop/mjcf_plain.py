@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from copy import deepcopy
 from xml.etree import ElementTree as ET
 
@@ -20,6 +20,7 @@ BY_GEOMS = ("inertiafromgeom", "inertiagrouprange")
 WEIGHING = ("mass", "density", "shellinertia", "group")
 OWN = ("armature", "frictionloss", "damping", "actuatorfrcrange", "actuatorfrclimited")
 DRIVING = ("class", "gear", "ctrlrange", "ctrllimited", "forcerange", "forcelimited", "armature", "damping")
+TENDON = ("name", "class", "limited", "range", "frictionloss", "damping", "armature")
 KEPT: dict[str, tuple[str, ...]] = {
     "compiler": ("angle", "autolimits", "balanceinertia", "boundinertia", "boundmass", "eulerseq", *BY_GEOMS),
     "default": ("class",),
@@ -39,6 +40,8 @@ KEPT: dict[str, tuple[str, ...]] = {
     "motor": DRIVING,
     "position": DRIVING,
     "velocity": DRIVING,
+    "tendon": TENDON,
+    "spatial": TENDON,
     "key": ("name", "qpos"),
 }
 """Elements of the kinematics, and geoms -> their attributes that are kept."""
@@ -51,7 +54,7 @@ ALL_ACTUATORS = (
 )  # fmt: skip
 """Kinds of actuators, but for those of plugins."""
 
-IN_DEFAULTS = ("default", "joint", "site", "equality", *ACTUATORS)
+IN_DEFAULTS = ("default", "joint", "site", "equality", "tendon", *ACTUATORS)
 IN_BODIES = ("body", "frame", "replicate")
 REFUSED = {"attach": "a model that attaches others", "composite": "a composite body", "flexcomp": "a flexible body"}
 """Elements that make bodies in ways that are not read -> their description."""
@@ -61,9 +64,6 @@ TRANSMISSIONS = ("tendon", "site", "body", "slidersite", "cranksite")
 
 LEAST = "1e-9"
 """Mass [kg], and moment of inertia [kg m²], of a body for which the file has none."""
-
-MOST_COPIES = 1000
-"""Most copies that `replicate` may make, of copies too."""
 
 STILL = ("option", "size", "visual", "statistic", "custom", "extension", "include")
 """Sections that neither move nor hold anything."""
@@ -78,6 +78,7 @@ def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
     compiler = ET.SubElement(plain, "compiler")
     ET.SubElement(compiler, "lengthrange", mode="none")  # of muscles, which MuJoCo would simulate
     omitted: Counter[str] = Counter()
+    straight = straight_tendons(root)
     for section in root:
         if section.tag == "compiler":
             compiler.attrib.update(_attributes(section))
@@ -86,9 +87,9 @@ def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
         elif section.tag == "equality":
             plain.append(_equalities(section, notes))
         elif section.tag == "actuator":
-            plain.append(_actuators(section, notes))
+            plain.append(_actuators(section, {each.get("name", "") for each in straight}, notes))
         elif section.tag in ("tendon", "contact", "deformable", "sensor"):
-            others = [child for child in section if child.tag not in ("pair", "exclude")]
+            others = [child for child in section if child.tag not in ("pair", "exclude") and child not in straight]
             for child in others if section.tag == "tendon" else []:
                 _require_unlimited(child, root)
             nameless = Counter(child.tag for child in others if not child.get("name"))
@@ -100,6 +101,7 @@ def plain_model(root: ET.Element, notes: list[Note]) -> ET.Element:
             bodies = {body.get("name", "") for body in root.iter("body")} | {"world"}
             for each in unread_loops(section, bodies, "world", (), "connect, weld or joint of an equality"):
                 raise InvalidMechanism([each])
+    plain.append(_tendons(straight))
     compiler.attrib |= {"boundmass": LEAST, "boundinertia": LEAST}  # what moves has a mass; which one does not matter
     noted = Counter({tag: count for tag, count in omitted.items() if tag not in UNNOTED})
     note_names(notes, "left out, for they do not move anything", counted_names(noted))
@@ -140,9 +142,7 @@ def bare_model(root: ET.Element) -> ET.Element:
     return bare
 
 
-def kept(
-    element: ET.Element, omitted: Counter[str], is_kept: Callable[[ET.Element, bool], bool], copies: int = 1
-) -> ET.Element:
+def kept(element: ET.Element, omitted: Counter[str], is_kept: Callable[[ET.Element, bool], bool]) -> ET.Element:
     """An element, with its attributes that are known and those of its descendants that are kept.
 
     Parameters
@@ -150,16 +150,12 @@ def kept(
     omitted : the others, which are counted.
     is_kept : of an element, and whether it is one of defaults.
     """
-    if element.tag == "replicate":
-        copies *= max(1, int(number(element, "count")))
-        if copies > MOST_COPIES:
-            raise fault("replicate", f"{copies} copies", f"at most {MOST_COPIES}")
     copy = ET.Element(element.tag, _attributes(element))
     for child in element:
         if child.tag in REFUSED:
             raise fault(str(child.tag), REFUSED[child.tag], "bodies one by one, as MuJoCo saves a compiled model")
         if is_kept(child, element.tag == "default"):
-            copy.append(kept(child, omitted, is_kept, copies))
+            copy.append(kept(child, omitted, is_kept))
         elif element.tag != "default":
             omitted[child.tag] += 1
     return copy
@@ -189,27 +185,57 @@ def _equalities(section: ET.Element, notes: list[Note]) -> ET.Element:
     return kept
 
 
-def _require_unlimited(tendon: ET.Element, root: ET.Element) -> None:
-    """Refuse a tendon whose length is limited: it holds its joints or bodies together."""
+def straight_tendons(root: ET.Element) -> list[ET.Element]:
+    """The tendons between two sites alone that an actuator pulls, or whose length is limited; no sites that meet."""
+    driven = {each.get("tendon") for each in root.iterfind("actuator/*")}
+    meeting = [{each.get("site1"), each.get("site2")} for each in root.iterfind("equality/*")]
+    straight = [each for each in root.iterfind("tendon/spatial") if [child.tag for child in each] == ["site", "site"]]
+    apart = [each for each in straight if {site.get("site") for site in each} not in meeting]
+    return [each for each in apart if each.get("name", "") in driven or _is_limited(each, root)]
+
+
+def _tendons(straight: Iterable[ET.Element]) -> ET.Element:
+    """Straight tendons, with what limits and brakes them."""
+    kept = ET.Element("tendon")
+    for tendon in straight:
+        copy = ET.SubElement(kept, "spatial", _attributes(tendon))
+        for site in tendon:
+            ET.SubElement(copy, "site", site=site.get("site", ""))
+    return kept
+
+
+def _is_limited(tendon: ET.Element, root: ET.Element) -> bool:
+    """True for a tendon whose length is limited: it holds its joints or bodies together."""
     defaults = [each for each in root.iter("default") if each.get("class", "main") == tendon.get("class", "main")]
     said = {key: text for each in defaults for kind in each.iterfind("tendon") for key, text in kind.attrib.items()}
     said |= tendon.attrib
-    if said.get("limited", "auto") == "true" or ("range" in said and said.get("limited") != "false"):
-        place = f"tendon <{tendon.tag}> '{tendon.get('name', '')}'"
-        raise fault(place, "a limit of its length, which is not read", "connect, weld or joint, or a model without it")
+    return said.get("limited", "auto") == "true" or ("range" in said and said.get("limited") != "false")
 
 
-def _actuators(section: ET.Element, notes: list[Note]) -> ET.Element:
-    """The actuators of joints, with what limits their forces; notes name the others."""
+def _require_unlimited(tendon: ET.Element, root: ET.Element) -> None:
+    """Refuse a tendon whose length is limited, and which is not read."""
+    if _is_limited(tendon, root):
+        place, way = f"tendon <{tendon.tag}> '{tendon.get('name', '')}'", "a straight tendon between two sites"
+        raise fault(place, "a limit of its length, which is not read", f"connect, weld or joint, or {way}")
+
+
+def _actuators(section: ET.Element, straight: Container[str], notes: list[Note]) -> ET.Element:
+    """The actuators of joints and of straight tendons, with what limits their forces; notes name the others."""
     kept = ET.Element("actuator")
     for child in section:
-        joint = child.get("joint") or child.get("jointinparent")
-        if joint:
+        target = target_of(child, straight)
+        if target:
             kind = child.tag if child.tag in ACTUATORS else "position"  # whose control is no force either
-            ET.SubElement(kept, kind, _attributes(child, kind), joint=joint)
+            ET.SubElement(kept, kind, _attributes(child, kind) | target)
         else:
-            notes.append(Note("an actuator that drives no joint itself is left out", (transmission_text(child),)))
+            notes.append(Note("an actuator of what is not read is left out", (transmission_text(child),)))
     return kept
+
+
+def target_of(actuator: ET.Element, straight: Container[str]) -> dict[str, str]:
+    """The joint, or the straight tendon, that an actuator drives, as its attribute; empty where it is neither."""
+    joint, tendon = actuator.get("joint") or actuator.get("jointinparent"), actuator.get("tendon", "")
+    return {"joint": joint} if joint else {"tendon": tendon} if tendon and tendon in straight else {}
 
 
 def transmission_text(actuator: ET.Element) -> str:

@@ -25,9 +25,10 @@ from .mjcf_bodies import is_half, read_struts
 from .mjcf_geoms import read_collision
 from .mjcf_masses import read_masses
 from .mjcf_model import MjcfModel
-from .mjcf_plain import plain_model, transmission_text
+from .mjcf_plain import plain_model, straight_tendons, target_of, transmission_text
+from .mjcf_tendons import tendon_legs
 from .mjcf_writing import MADE_UP, NOTE
-from .notes import Note, noting
+from .notes import Note, note_names, noting
 from .opened import loops_by_name
 from .robots import ImportOptions, Robot, mechanism_of
 from .xml_reading import fault, read_xml
@@ -50,13 +51,14 @@ def from_mjcf(
 
     Hinges, slides, balls and free joints, several on one body too, become joints between bodies; `connect` becomes a
     ball, two between the same bodies a hinge, `weld` makes two bodies one; sites `closing_<name>_1` and
-    `closing_<name>_2` meet in a ball. Coordinates count as `qpos` does. Of a whole robot, what the end effector's
-    motion against the base does not depend on is left out. Loops that are open are closed by moving passive joints.
-    Base coordinates are those of the world at the configuration. Geoms that collide become shapes of their bodies; what
-    the file lets pass through each other, and what overlaps at home, may touch (`ignore`). Masses are those of
-    inertial elements, or of geoms that are no meshes, as MuJoCo has them. Of a driven joint, armature, friction, and
-    the most that its actuators exert are read: the smaller side of `forcerange`, of `ctrlrange` where control is a
-    force, both by the gear, and of `actuatorfrcrange`.
+    `closing_<name>_2` meet in a ball. A straight tendon between two sites that an actuator pulls, or whose length is
+    limited, becomes a universal joint, a slide that counts its length, and a ball. Coordinates count as `qpos` does. Of
+    a whole robot, what the end effector's motion against the base does not depend on is left out. Loops that are open
+    are closed by moving passive joints. Base coordinates are those of the world at the configuration. Geoms that
+    collide become shapes of their bodies; what the file lets pass through each other, and what overlaps at home, may
+    touch (`ignore`). Masses are those of inertial elements, or of geoms that are no meshes, as MuJoCo has them. Of a
+    driven joint, armature, friction, and the most that its actuators exert are read: the smaller side of `forcerange`,
+    of `ctrlrange` where control is a force, both by the gear, and of `actuatorfrcrange`.
 
     Parameters
     ----------
@@ -125,6 +127,11 @@ def _robot(root: ET.Element, model: MjcfModel, notes: list[Note]) -> Robot:
     if site is not None and written.get("end_effector") in places:
         places[written["end_effector"]] = (written["end_effector"], site[1])
     joints, loops = list(model.joints(notes)), list(model.loops(notes))
+    names = [*(part for joint in joints for part in (joint.name, *joint.connects)), *(loop.name for loop in loops)]
+    legs = list(tendon_legs(model, names, notes))
+    places |= {body: (body, point) for leg in legs for body, point in leg.places.items()}
+    joints, loops = [*joints, *(part for leg in legs for part in leg.joints)], [*loops, *(leg.end for leg in legs)]
+    note_names(notes, "straight tendons are legs of a universal joint, a slide and a ball", (leg.name for leg in legs))
     taken = [*(joint.name for joint in joints), *(loop.name for loop in loops)]
     named = loops_by_name(places, [*loops, *model.inactive_loops()], taken, notes)
     return Robot(
@@ -137,6 +144,8 @@ def _robot(root: ET.Element, model: MjcfModel, notes: list[Note]) -> Robot:
         roundings=model.roundings,
         couplings=tuple(model.couplings(notes)),
         undriven=_undriven(root),
+        unread=", ".join(map(transmission_text, _unread(root))),
+        spans={leg.name: leg.span for leg in legs},
         collision=_collision(root, model, data, notes),
         **written,
     )
@@ -177,10 +186,15 @@ def _undriven(root: ET.Element) -> str:
     actuators = root.findall("actuator/*")
     if not actuators:
         return "the model has no actuators"
-    through = [each for each in actuators if not (each.get("joint") or each.get("jointinparent"))]
-    if through:
-        return f"actuators that drive no joint itself: {', '.join(map(transmission_text, through))}"
+    if unread := _unread(root):
+        return f"actuators of what is not read: {', '.join(map(transmission_text, unread))}"
     return "no actuator of a joint"
+
+
+def _unread(root: ET.Element) -> list[ET.Element]:
+    """The actuators of neither a joint nor a straight tendon."""
+    straight = {each.get("name", "") for each in straight_tendons(root)}
+    return [each for each in root.iterfind("actuator/*") if not target_of(each, straight)]
 
 
 def _own_notes(root: ET.Element) -> dict[str, str]:

@@ -21,6 +21,7 @@ from ...machine.description.home_mobility import loop_conditions
 from ...machine.description.structure import Structure
 from ...machine.motion.displacements import joint_displacements
 from ...machine.motion.loops import at_reference, loop_errors_here, loop_slopes, moved
+from ...tolerances import TOLERANCES
 from .digits import NOTHING, Rounding
 from .relations import Axis, Relation, axes_of, equations
 
@@ -164,7 +165,7 @@ def _too_far(
     for relation, point in relations:
         for joint in {axes[index].joint for index in relation.members}:
             place, most = (0, relation.bound) if point is None else (1, relation.bound / length)
-            bounds[joint, place] = max(bounds[joint, place], most)
+            bounds[joint, place] = max(bounds[joint, place], min(most, TOLERANCES.file_digits))
     sizes = np.linalg.norm(displaced.reshape(-1, 2, 3), axis=2)
     return set(np.flatnonzero((sizes > FURTHER * bounds + HOLDS).any(axis=1)).tolist())
 

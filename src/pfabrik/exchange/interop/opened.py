@@ -109,6 +109,8 @@ class OpenMechanism:
         The collision geometry [length].
     is_asked : bool
         True if these roundings are asked for, and not read off the digits of a file.
+    spans : mapping of str to tuple of str
+        Slide -> the two joints or loops whose distance is its coordinate.
     """
 
     name: str
@@ -123,6 +125,7 @@ class OpenMechanism:
     roundings: Mapping[str, Rounding] = field(default_factory=dict)
     collision: Collision = NO_COLLISION
     is_asked: bool = False
+    spans: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     def tree(self) -> Structure:
         """The joints alone, as a structure that can be moved."""

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...common.arrays import Floats
+from ...common.rotations import square_to
 from ...machine.description.joints import Joint
 from ...tolerances import TOLERANCES
 from .digits import Rounding
@@ -103,13 +104,17 @@ def equations(
     """Yield the values (k,) and slopes of each equation of a relation; `centre` is the common point, if any [L]."""
     first, *others = relation.members
     if relation.kind == "parallel":
+        across = np.array(square_to(_along(axes[first])))  # along the axis nothing is asked
         if relation.along is not None:
-            slopes: list[Slope] = [(axes[first].joint, False, _tilt(axes[first], relation.along))]
-            yield np.cross(_along(axes[first]), relation.along), slopes
+            slopes: list[Slope] = [(axes[first].joint, False, across @ _tilt(axes[first], relation.along))]
+            yield across @ np.cross(_along(axes[first]), relation.along), slopes
         for other in others:
             one, axis = axes[first], axes[other]
-            slopes = [(axis.joint, False, _tilt(axis, _along(one))), (one.joint, False, -_tilt(one, _along(axis)))]
-            yield np.cross(_along(axis), _along(one)), slopes
+            tilts = across @ _tilt(axis, _along(one)), across @ _tilt(one, _along(axis))
+            yield (
+                across @ np.cross(_along(axis), _along(one)),
+                [(axis.joint, False, tilts[0]), (one.joint, False, -tilts[1])],
+            )
     elif relation.kind == "square":
         along = [_along(axes[index]) for index in relation.members]
         slopes = []
@@ -123,10 +128,11 @@ def equations(
         for index in relation.members:
             axis = axes[index] if relation.line is None else axes[relation.line]
             offset = axes[index].point / length - np.asarray(centre)
-            across = np.eye(3) if axis.along is None else _cross(axis.along)
+            onto = np.eye(3) if axis.along is None else np.array(square_to(axis.along))
+            across = onto if axis.along is None else onto @ _cross(axis.along)
             slopes = [(axes[index].joint, True, across), (-1, True, -across)]
             if axis.along is not None:
-                slopes.append((axis.joint, False, _tilt(axis, offset)))
+                slopes.append((axis.joint, False, onto @ _tilt(axis, offset)))
             yield across @ offset, slopes
 
 

@@ -253,9 +253,7 @@ class RobotInMujoco(CompiledModel):
 
 def _names_of(mechanism: Mechanism, coordinate: JointCoordinate) -> list[str]:
     """Names that a coordinate's joint may have in the model it comes from."""
-    parts = coordinate.joint.name.split("+")
-    names = [coordinate.name]
-    names += [parts[coordinate.place]] if len(parts) == 2 and coordinate.place < 2 else []
+    names = [*dict.fromkeys((coordinate.name, coordinate.alias))]
     names += [mechanism.end_effector] if coordinate.name == f"{mechanism.end_effector}_joint" else []
     return names
 

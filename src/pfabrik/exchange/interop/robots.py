@@ -18,11 +18,12 @@ from ...machine.description.joints import KINDS, Cone, Joint
 from ...machine.description.mechanism import Mechanism
 from ...machine.files.units import metres_of
 from .assembling import Imported, closed
-from .choices import NoEndEffector, choices_of
+from .choices import Build, NoEndEffector, choices_of, enough_drives
 from .collision import NO_COLLISION, Collision
 from .couplings import Coupling, with_coupled_drives
 from .digits import Rounding, worst
-from .driving import Rates, require_drives, with_actuators
+from .driving import Rates, no_drives, with_actuators
+from .first_motion import stuck_drives
 from .imported_masses import with_masses
 from .imported_shapes import with_collision
 from .names import unique
@@ -49,7 +50,9 @@ class Robot:
     roundings : joint or loop -> how exactly the digits of the file place it [m, rad]; other loops are as the worst.
     couplings : joints that follow others.
     undriven : what the file has in place of driven joints, for the refusal of a machine without any.
+    unread : its drives that are not read, by name.
     collision : its collision geometry [m].
+    spans : slide -> the two joints or loops whose distance is its coordinate.
     """
 
     name: str
@@ -66,6 +69,8 @@ class Robot:
     roundings: Mapping[str, Rounding] = field(default_factory=dict)
     couplings: Sequence[Coupling] = ()
     undriven: str = "none in the file"
+    unread: str = ""
+    spans: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     collision: Collision = NO_COLLISION
 
 
@@ -122,7 +127,9 @@ def _between(robot: Robot, base: str, end_effector: str, asked: ImportOptions, n
         asked = asked._replace(task=robot.task)
     opened = prune(_opened(rigid, base, tip, point, asked), notes)
     opened = with_coupled_drives(opened, rigid.joints, rigid.couplings, asked.actuated or (), notes)
-    require_drives(opened, robot.joints, robot.undriven)
+    if not any(joint.driven for joint in opened.joints):
+        enough = () if robot.unread else _enough(rigid, opened, end_effector)
+        raise no_drives(opened, robot.joints, robot.undriven, enough)
     home = closed(opened, notes)
     mechanism = with_actuators(home.mechanism, robot.order, robot.rates, metres_of(asked.length_unit))
     passive = (joint.name for joint in opened.joints if not joint.driven)
@@ -134,16 +141,40 @@ def _between(robot: Robot, base: str, end_effector: str, asked: ImportOptions, n
     return Imported(mechanism, home.gap, tuple(notes))
 
 
+def _enough(robot: Robot, opened: OpenMechanism, end_effector: str) -> tuple[str, ...]:
+    """Drives that move all of a machine within a robot; none where they cannot be found."""
+    with suppress(PfabrikError):
+        if any(KINDS[joint.type].actuatable for joint in opened.joints):
+            return enough_drives(opened.base, end_effector, opened.joints, _build(robot))
+    return ()
+
+
+def _build(robot: Robot) -> Build:
+    """What makes mechanisms of a robot, for choices among them."""
+    plain = dataclasses.replace(robot, collision=NO_COLLISION)
+
+    def build(base: str, end_effector: str, drives: Sequence[str] | None) -> Mechanism:
+        driven = _with_drives(plain, drives)
+        return _between(driven, base, end_effector, ImportOptions(drives), []).mechanism
+
+    return build
+
+
 def _proposals(mechanism: Mechanism, made: Callable[[float], Mechanism]) -> Iterator[Note]:
-    """The least `within` that gives a mechanism more motions, where its loops all but let it have them."""
-    counts = generic_of(mechanism).mobility
-    if not counts.nearly_free and counts.platform > 0:
+    """Drives that move nothing; the least `within` that gives more motions, where loops all but let it have them."""
+    counts, stuck = generic_of(mechanism).mobility, stuck_drives(mechanism)
+    if stuck:
+        what = "no drive moves anything" if len(stuck) == len(mechanism.drives) else "drives that move nothing"
+        yield Note(f"{what}: forward kinematics does not follow 10 deg, or a tenth of a range, from home", stuck)
+    if not (stuck or counts.nearly_free) and counts.platform > 0:
         return
     for within in PROPOSED:
         with suppress(PfabrikError):
-            more = generic_of(made(within)).mobility.platform
-            if more > counts.platform:
+            again = made(within)
+            more = generic_of(again).mobility.platform
+            if more > counts.platform or (stuck and not stuck_drives(again)):
                 wins = f"{counted(more, 'freedom')} of the end effector for {counts.platform}"
+                wins = wins if more > counts.platform else "drives that move it"
                 what = f"the loops lock by little: making what is off by less parallel, equal, or meet gives {wins}"
                 yield Note(f"{what}: try --within {within:g}")
                 return
@@ -210,13 +241,8 @@ def _end_effector(robot: Robot, end_effector: str | None, base: str) -> str:
         return end_effector
     if robot.end_effector is not None:
         return robot.end_effector
-    rigid = _with_merged_bodies(dataclasses.replace(robot, collision=NO_COLLISION), base, base)
-
-    def build(base: str, end_effector: str, drives: Sequence[str] | None) -> Mechanism:
-        driven = _with_drives(rigid, drives)
-        return _between(driven, base, end_effector, ImportOptions(drives), []).mechanism
-
-    raise NoEndEffector(choices_of(rigid.joints, rigid.loops, base, build))
+    rigid = _with_merged_bodies(robot, base, base)
+    raise NoEndEffector(choices_of(rigid.joints, rigid.loops, base, _build(rigid), robot.unread))
 
 
 def _place(robot: Robot, end_effector: str) -> tuple[str, Floats | None]:
@@ -282,6 +308,7 @@ def _opened(robot: Robot, base: str, tip: str, point: Floats | None, asked: Impo
         {name: Rounding(each.length / metres, each.angle) for name, each in roundings.items()},
         robot.collision.in_unit(metres),
         within is not None,
+        robot.spans,
     )
 
 

@@ -14,11 +14,11 @@ from ...common.rotations import from_quaternion
 from ...errors import Fault, InvalidMechanism, near_miss
 from ...machine.description.graph import Edge, spanning_tree
 from ...machine.description.joints import Joint
-from .couplings import Coupling
 from .digits import FEWEST, NOTHING, Rounding, digits_of
 from .notes import Note, note_names
 from .told_loops import named_in
-from .urdf_links import HERE, MOST_FAULTS, UrdfJoint, UrdfLinks, frame_at, friction_of, require_few, rotor_of
+from .urdf_links import HERE, MOST_FAULTS, UrdfJoint, UrdfLinks, frame_at
+from .xml_fields import Field, coupling_of, drive_of, read_fields, rotor_of, text_at
 from .xml_reading import fault, number, numbers_in
 
 TYPES = ("revolute", "continuous", "prismatic", "fixed", "ball", "universal")
@@ -29,14 +29,11 @@ MODEL = "__model__"
 
 WORLD = "world"
 
-ENDLESS, FAR = 1e16, 20.0
-"""A limit [rad or m] that stands for none; how far off the other one, three turns, one that takes its place is."""
+AXES = {tag: Field(f"{tag}/xyz", (0.0, 0.0, 1.0)) for tag in ("axis", "axis2")}
+"""Directions of a joint."""
 
 OLD = ("1.0", "1.2", "1.3", "1.4")
 """Versions in which axes are in the model's frame."""
-
-LIMITING = ("upper", "velocity", "acceleration", "effort")
-"""Limits of SDF that are endless unless it says otherwise, besides the lower one."""
 
 CUT_LAST = {"BALL": 2, "REVOLUTE": 1, "CONTINUOUS": 1}
 """Joint types -> how much rather than others they close a loop: those whose coordinates nobody asks for."""
@@ -163,7 +160,6 @@ def read_sdf(root: ET.Element, asked: Collection[str], notes: list[Note]) -> Urd
     model = only_model(root, notes)
     name = model.get("name", "mechanism")
     place, poses = f"model '{name}'", Poses(model, {})
-    require_few(model)
     counts = Counter(each.get("name", "") for each in model if each.tag in ("link", "frame", "joint"))
     for each in [each for each, count in counts.items() if count > 1 or each in ("", WORLD, MODEL)]:
         raise fault(place, f"the name '{each}', which is empty, reserved or used twice", "a name of its own")
@@ -219,49 +215,35 @@ def sdf_joint(element: ET.Element, poses: Poses, version: str = "") -> UrdfJoint
     if parent == child:
         raise fault(place, f"'{parent}' as parent and as child", "two links")
     frame, meets = (_place_on(poses, element, end) for end in ("parent", "child"))
-    across = frame[:3, :3] @ poses[name][:3, :3].T
-    axes = []
-    for tag in ("axis", "axis2"):
-        by_model = (element.findtext(f"{tag}/use_parent_model_frame") or "").strip() in ("1", "true")
-        xyz = element.find(f"{tag}/xyz")
-        direction = numbers_in("0 0 1" if xyz is None else xyz.text or "", 3)
-        if direction is None or not direction.any():
-            raise fault(f"{place}.{tag}", "no direction", "three numbers, not all zero")
-        base = xyz.get("expressed_in", "") if xyz is not None else ""
-        base = MODEL if by_model or version in OLD else base or name
-        axes.append(across @ poses[base][:3, :3] @ direction)
-    low, high, speed, acceleration, effort = (
-        _number(element, f"axis/limit/{key}", default, place)
-        for key, default in [("lower", -ENDLESS), *((key, ENDLESS) for key in LIMITING)]
-    )
-    dry, viscous = (_number(element, f"axis/dynamics/{key}", 0.0, place) for key in ("friction", "damping"))
-    limits = None
-    if kind in ("revolute", "prismatic") and min(abs(low), abs(high)) < ENDLESS:
-        limits = (low if low > -ENDLESS else high - FAR, high if high < ENDLESS else low + FAR)
+    across, faults = frame[:3, :3] @ poses[name][:3, :3].T, list[Fault]()
+    directions = read_fields(element, AXES, place, faults)
+    idle = [tag for tag, xyz in directions.items() if not xyz.any()]
+    faults += [Fault(f"{place}.{tag}", "no direction", "three numbers, not all zero") for tag in idle]
+    axes = [across @ _turn_of(element, tag, poses, version) @ xyz for tag, xyz in directions.items()]
     mimic = next((each for path in ("axis/mimic", "mimic") if (each := element.find(path)) is not None), None)
-    coupling = None
-    if mimic is not None:
-        leader = mimic.get("joint", "")
-        if leader not in poses.elements:
-            raise fault(f"{place}.mimic", f"'{leader}'{near_miss(leader, poses.elements)}", "another joint")
-        offset, ratio, reference = (
-            _number(mimic, key, default, place)
-            for key, default in (("offset", 0.0), ("multiplier", 1.0), ("reference", 0.0))
-        )
-        coupling = Coupling(name, leader, (offset - ratio * reference, ratio))
-    max_speed = speed if 0.0 < speed < ENDLESS else None
     is_apart = any(element.find(f"{end}_frame") is not None for end in ("parent", "child"))
-    joint = UrdfJoint(name, kind.upper(), parent, child, frame, axes=np.array(axes), meets=meets if is_apart else None)
-    return replace(
-        joint,
-        limits=limits,
-        max_speed=max_speed,
-        max_acceleration=acceleration if 0.0 < acceleration < ENDLESS else None,
-        max_torque=effort if 0.0 < effort < ENDLESS else None,
-        rotor=rotor_of(element),
-        friction=friction_of(dry, viscous),
-        mimic=coupling,
+    joint = UrdfJoint(
+        name,
+        kind.upper(),
+        parent,
+        child,
+        frame,
+        axes=np.array(axes),
+        meets=meets if is_apart else None,
+        rotor=rotor_of(element, place, faults),
+        mimic=coupling_of(name, mimic, poses.elements, place, faults),
+        **drive_of(kind.upper(), element.find("axis"), f"{place}.axis", faults),
     )
+    if faults:
+        raise InvalidMechanism(faults)
+    return joint
+
+
+def _turn_of(joint: ET.Element, tag: str, poses: Poses, version: str) -> Floats:
+    """The rotation (3, 3) of the frame in which an axis of a joint is, in the model."""
+    by_model = text_at(joint, f"{tag}/use_parent_model_frame") in ("1", "true") or version in OLD
+    base = MODEL if by_model else text_at(joint, f"{tag}/xyz/expressed_in") or joint.get("name", "")
+    return poses[base][:3, :3]
 
 
 def _place_on(poses: Poses, joint: ET.Element, end: str) -> Floats:
@@ -277,18 +259,6 @@ def _place_on(poses: Poses, joint: ET.Element, end: str) -> Floats:
     if link != own:
         raise fault(place, f"'{given}', which is on '{link}'", f"a frame on '{own}'")
     return poses[given]
-
-
-def _number(element: ET.Element, path: str, default: float, place: str) -> float:
-    """A number that an element or attribute has, endless ones among them."""
-    text = (element.findtext(path) or element.get(path) or str(default)).strip()
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if np.isnan(value):
-        raise fault(f"{place}.{path.replace('/', '.')}", f"'{text}'", "a number")
-    return value
 
 
 def _driven(model: ET.Element) -> list[str]:

@@ -8,7 +8,7 @@ is moved by itself, no further than rounding may have put it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from ...machine.motion.loops import loop_errors_here
 from ...tolerances import TOLERANCES
 from .closing import radius_around
 from .digits import NOTHING, Rounding, worst
-from .nearest_geometry import Kept, Moving, nearest_geometry, walked
+from .nearest_geometry import HOLDS, Kept, Moving, nearest_geometry, walked
 from .notes import Note
 from .opened import OpenMechanism
 from .relations import ROUNDED, axes_of, directions, meetings
@@ -29,7 +29,7 @@ from .relations import ROUNDED, axes_of, directions, meetings
 OPEN = 3e-13
 """Largest loop error with which the machine found counts as one that moves [L and rad]."""
 
-MARGIN, CLEAR = 3.0, 5e-3
+MARGIN, CLEAR = 3.0, 1.5e-2
 """Factor on what rounding can do to first order to a singular value, and the value [L and rad] from which a condition
 is one, whatever the digits of a file."""
 
@@ -40,7 +40,7 @@ NOT_NOTED = 1e-12
 def straighten(
     joints: Sequence[Joint], opened: OpenMechanism, reference: Floats | None, slack: float, notes: list[Note]
 ) -> Sequence[Joint]:
-    """The joints with exact geometry where their roundings allow it: what axes were meant to be, then what moves.
+    """The joints with the geometry that axes were meant to have, where their roundings allow it.
 
     Joints of loops that all but lock are moved as far as rounding may have put them; others no further than what counts
     as parallel or aligned anyway, or, where nothing is known of the digits, not at all.
@@ -50,15 +50,13 @@ def straighten(
     reference : the reference point [length].
     slack : by how much closing the loops may have moved joints out of place, besides [rad or size].
     """
-    point: Any = None if reference is None else tuple(reference)
-    given = Structure(opened.name, tuple(joints), opened.end_effector, point, opened.base)
-    has_roundings, unclear = bool(opened.roundings), unclear_conditions(given)
+    given = _structure(joints, opened, reference)
+    below = _least_clear(opened, joints)
+    has_roundings, unclear = bool(opened.roundings), unclear_conditions(given, below)
     if not has_roundings and not unclear:
         return joints
-    size, more = radius_around([joint.at for joint in joints if joint.at is not None]), slack + ROUNDED
-    known = dict(opened.roundings) | dict(_roundings_of_hinges(opened, joints))
-    locked = frozenset(range(len(joints))) if opened.is_asked else unclear_joints(given)
-    roundings = _roundings(joints, known, size, locked)
+    size, more = _size(joints), slack + ROUNDED
+    roundings = _roundings(given, opened, size, below)
     allowed = [Rounding(each.length + more * size, each.angle + more) for each in roundings]
     most = np.inf if opened.is_asked else TOLERANCES.alignment
     kept: Kept = [(each, None) for each in directions(axes_of(joints, roundings), more, most)]
@@ -66,44 +64,75 @@ def straighten(
     kept += meetings(axes_of(exact.joints, roundings), more * size)
     exact, kept = nearest_geometry(exact, [each._replace(angle=0.0) for each in allowed], kept)
     why = "as asked for" if opened.is_asked else "within the digits of the file"
-    before, after = _severity(unclear), _severity(unclear_conditions(exact))
-    if after < before or (after == before and has_roundings):
-        notes += _notes(given, exact, kept, size, opened.length_unit, why)
-    else:
-        exact, kept = given, []
-    if not unclear_conditions(exact):
-        return exact.joints
-    if not has_roundings:
+    before, after = len(unclear), len(unclear_conditions(exact, below))
+    if after > before or (after == before and not has_roundings):
+        return joints
+    notes += _notes(given, exact, kept, size, opened.length_unit, why)
+    return exact.joints
+
+
+def unlocked(
+    joints: Sequence[Joint], opened: OpenMechanism, reference: Floats | None, slack: float, notes: list[Note]
+) -> Sequence[Joint]:
+    """The joints of the nearest machine that moves, where loops all but lock and roundings explain that.
+
+    Lengths and angles may agree in ways that no pair of axes shows: a third rod of a parallelogram. Arguments as of
+    `straighten`, with joints that nothing merges any more.
+    """
+    given = _structure(joints, opened, reference)
+    below = _least_clear(opened, joints)
+    if not unclear_conditions(given, below):
+        return joints
+    size, more = _size(joints), slack + ROUNDED
+    roundings = _roundings(given, opened, size, below)
+    if not opened.roundings:
         default = Rounding(TOLERANCES.alignment * size, TOLERANCES.alignment)
-        allowed = [default if each.angle > more else each for each in allowed]
-    moving = _moving(exact, allowed, kept)
+        roundings = [default if each.angle > 0.0 else each for each in roundings]
+    allowed = [Rounding(each.length + more * size, each.angle + more) for each in roundings]
+    axes = axes_of(joints, [NOTHING] * len(joints))
+    kept: Kept = [*((each, None) for each in directions(axes, HOLDS)), *meetings(axes, HOLDS * size)]
+    moving = _moving(given, allowed, kept, below)
     if moving is None:
-        return exact.joints
-    notes.append(_note_of_moving(exact.joints, moving.joints, opened.length_unit))
+        return joints
+    notes.append(_note_of_moving(joints, moving.joints, opened.length_unit))
     return moving.joints
 
 
-def _moving(structure: Structure, allowed: Sequence[Rounding], kept: Kept) -> Structure | None:
+def _structure(joints: Sequence[Joint], opened: OpenMechanism, reference: Floats | None) -> Structure:
+    point: Any = None if reference is None else tuple(reference)
+    return Structure(opened.name, tuple(joints), opened.end_effector, point, opened.base)
+
+
+def _size(joints: Sequence[Joint]) -> float:
+    return radius_around([joint.at for joint in joints if joint.at is not None])
+
+
+def _least_clear(opened: OpenMechanism, joints: Sequence[Joint]) -> float:
+    """Singular value [L and rad] from which a condition of the loops is one, whatever the digits of the file."""
+    worst_of_all = worst(opened.roundings.values())
+    return max(TOLERANCES.nearly_implied, _reach([worst_of_all] * len(joints), _size(joints)))
+
+
+def _reach(roundings: Sequence[Rounding], length: float) -> float:
+    """What roundings do to first order to a singular value, with a margin [L and rad]."""
+    most = np.sqrt(3.0 * sum(each.angle**2 + (each.length / length) ** 2 for each in roundings))
+    return min(MARGIN * float(most), CLEAR)
+
+
+def _moving(structure: Structure, allowed: Sequence[Rounding], kept: Kept, below: float) -> Structure | None:
     """The nearest machine that moves, to one whose loops all but lock; None where rounding does not explain it."""
-    length = structure.characteristic_length
-    most = np.sqrt(3.0 * sum(each.angle**2 + (each.length / length) ** 2 for each in allowed))
-    threshold = min(MARGIN * float(most), CLEAR)
-    before = unclear_conditions(structure)
+    threshold = _reach(allowed, structure.characteristic_length)
+    before = unclear_conditions(structure, below)
     if not any(value <= threshold for value in before):
         return None
     for relations in (kept, []):
         moving = Moving(structure, threshold)
         found, _ = nearest_geometry(structure, allowed, relations, moving)
-        if len(unclear_conditions(found)) < len(before):
+        if len(unclear_conditions(found, below)) < len(before):
             elsewhere = walked(found, moving.rank, 1)
             if np.abs(loop_errors_here(found, elsewhere)).max() <= OPEN:
                 return found
     return None
-
-
-def _severity(unclear: Sequence[float]) -> tuple[int, float]:
-    """Severity with which loops lock: fewer conditions are better, then smaller ones."""
-    return len(unclear), max(unclear, default=0.0)
 
 
 def _roundings_of_hinges(opened: OpenMechanism, joints: Sequence[Joint]) -> Iterator[tuple[str, Rounding]]:
@@ -118,13 +147,16 @@ def _roundings_of_hinges(opened: OpenMechanism, joints: Sequence[Joint]) -> Iter
                 yield joint.name, Rounding(rounding.length, rounding.angle + 2.0 * rounding.length / apart)
 
 
-def _roundings(joints: Sequence[Joint], known: Mapping[str, Rounding], size: float, locked: Set[int]) -> list[Rounding]:
+def _roundings(given: Structure, opened: OpenMechanism, size: float, below: float) -> list[Rounding]:
     """The rounding of every joint; where nothing is known, that of the worst digits of files."""
+    joints, known = given.joints, dict(opened.roundings) | dict(_roundings_of_hinges(opened, given.joints))
+    locked = frozenset(range(len(joints))) if opened.is_asked else unclear_joints(given, below)
     coarsest = worst(known.values()) if known else Rounding(TOLERANCES.file_gap * size, TOLERANCES.file_angle)
     aligned = Rounding(TOLERANCES.alignment * size, TOLERANCES.file_angle) if known else NOTHING
     roundings = []
     for index, joint in enumerate(joints):
-        rounding, most = known.get(joint.name, coarsest), coarsest if index in locked else aligned
+        parts = [known[name] for name in (joint.name, *joint.merged) if name in known]
+        rounding, most = worst(parts) if parts else coarsest, coarsest if index in locked else aligned
         roundings.append(Rounding(min(rounding.length, most.length), min(rounding.angle, most.angle)))
     return roundings
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -18,20 +17,23 @@ from .couplings import Coupling
 from .digits import FEWEST, NOTHING, Rounding, digits_of
 from .loops_file import LinkLoop
 from .opened import LoopType, frame_along
-from .xml_reading import fault, number, number_text, numbers_in
+from .xml_fields import UNLIMITED, Field, coupling_of, drive_of, read_fields, rotor_of, text_at
+from .xml_reading import fault, number_text, numbers_in
 
 TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar", "ball", "spherical", "universal")
 """Joint types that are read: those of URDF, and those that Drake and MuJoCo add."""
 
-MOST_PARTS, MOST_FAULTS = 5_000, 20
-"""Most links or joints of a robot: a humanoid with every bolt ten times; and most faults that are told at once."""
-
-ENDLESS = 1e9
-"""Efforts and friction from which on a number stands for none [SI units]."""
-
-XACRO = "; xacro files want xacro"
+MOST_FAULTS = 20
+"""Most faults that are told at once."""
 
 ZERO, X = "0 0 0", "1 0 0"
+PLACED = {
+    "xyz": Field("origin/xyz", (0.0, 0.0, 0.0), "m"),
+    "rpy": Field("origin/rpy", (0.0, 0.0, 0.0), "rad"),
+    "axis": Field("axis/xyz", (1.0, 0.0, 0.0)),
+}
+"""Where a joint is."""
+
 HERE: Floats = np.eye(4)
 """A frame that is another's."""
 
@@ -164,43 +166,27 @@ def read_links(root: ET.Element, retyped: Mapping[str, str], asked: Collection[s
     retyped : joint -> its type, in place of that of the description.
     asked : names of the joints that a caller drives or holds.
     """
-    require_few(root)
-    faults = list(islice(_faults(root), MOST_FAULTS))
-    if faults:
-        raise InvalidMechanism(faults)
-    written = {element.get("name", ""): element for element in root.iterfind("joint")}
+    joints = _joints(root, retyped)
     first: dict[str, UrdfJoint] = {}
-    second = []
-    for element in written.values():
-        joint = _joint(element, retyped)
-        second += [joint] if joint.child in first else []
+    for joint in joints:
         first.setdefault(joint.child, joint)
-    for element in root.iterfind("coupling"):
-        leader, follower = (first.get(_link(element, end)) for end in ("predecessor", "successor"))
-        ratio = numbers_in(_text(element.find("ratio"), "value", ""), 1)
-        if leader and follower and ratio is not None and leader.parent == follower.parent:
-            coupling = Coupling(follower.name, leader.name, (0.0, float(ratio[0])))
-            first[follower.child] = replace(follower, mimic=coupling)
-    for element in root.iterfind("transmission"):
-        moved = {each.get("name", "") for each in element.iterfind("joint")}
-        rotor = rotor_of(element.find("actuator"))
-        for joint in [each for each in first.values() if rotor != (None, None) and each.name in moved]:
-            first[joint.child] = replace(joint, rotor=rotor)
+    second = [joint for joint in joints if first[joint.child] is not joint]
+    _add_gears(root, first)
     names = [link.get("name", "") for link in root.iterfind("link")]
     roots = [name for name in names if name not in first]
     if len(roots) != 1:
         found = f"{len(roots)} links that are no child" + (f" ({', '.join(roots[:5])})" if roots else "")
         raise fault("robot", found, "one, from which all others hang")
     outward = outward_from(roots[0], first.values())
-    frames, apart = {roots[0]: HERE}, set(names) - {roots[0], *(joint.child for joint in outward)}
-    if apart:
+    if apart := set(names) - {roots[0], *(joint.child for joint in outward)}:
         some = ", ".join(sorted(apart)[:5])
         raise fault("robot", f"links that do not hang on '{roots[0]}' ({some})", "a tree of all links")
+    frames = {roots[0]: HERE}
     for joint in outward:
         frames[joint.child] = frames[joint.parent] @ joint.frame
-    of_links, of_joints = _roundings(outward, second, written, roots[0])
-    driven = [each.get("name", "") for each in root.iterfind("transmission/joint")]
-    driven += [joint.get("name", "") for joint in root.iterfind("ros2_control/joint[command_interface]")]
+    of_links, of_joints = _roundings(outward, second, _axes_written(root), roots[0])
+    paths = ("transmission/joint", "ros2_control/joint[command_interface]")
+    driven = [each.get("name", "") for path in paths for each in root.iterfind(path)]
     tree = UrdfLinks(
         root.get("name", "mechanism"),
         roots[0],
@@ -214,11 +200,34 @@ def read_links(root: ET.Element, retyped: Mapping[str, str], asked: Collection[s
     return tree.closed_by([(joint, HERE) for joint in second], asked)
 
 
-def require_few(robot: ET.Element) -> None:
-    """Refuse a robot of more links, joints or frames than any has."""
-    for tag in ("joint", "link", "frame"):
-        if (count := len(robot.findall(tag))) > MOST_PARTS:
-            raise fault("robot", f"{count} {tag}s", f"at most {MOST_PARTS}")
+def _joints(root: ET.Element, retyped: Mapping[str, str]) -> list[UrdfJoint]:
+    """All joints as the file has them; InvalidMechanism with what keeps them from being read."""
+    links, joints = ([each.get("name", "") for each in root.iterfind(tag)] for tag in ("link", "joint"))
+    faults = [
+        Fault(f"{what} '{name}'", "a name that is empty, or used twice", "a name of its own")
+        for what, names in (("link", links), ("joint", joints))
+        for name, count in sorted(Counter(names).items())
+        if not name or count > 1
+    ]
+    found = [_joint(element, links, joints, retyped, faults) for element in root.iterfind("joint")]
+    if faults:
+        raise InvalidMechanism(faults[:MOST_FAULTS])
+    return found
+
+
+def _add_gears(root: ET.Element, joints: dict[str, UrdfJoint]) -> None:
+    """Put what elements beside the joints say of drives into the joints, by their children: couplings, and rotors."""
+    for element in root.iterfind("coupling"):
+        leader, follower = (joints.get(text_at(element, f"{end}/link")) for end in ("predecessor", "successor"))
+        ratio = numbers_in(text_at(element, "ratio/value"), 1)
+        if leader and follower and ratio is not None and leader.parent == follower.parent:
+            coupling = Coupling(follower.name, leader.name, (0.0, float(ratio[0])))
+            joints[follower.child] = replace(follower, mimic=coupling)
+    for element in root.iterfind("transmission"):
+        moved = {each.get("name", "") for each in element.iterfind("joint")}
+        rotor = rotor_of(element.find("actuator"), f"transmission '{element.get('name', '')}'", [])
+        for joint in [each for each in joints.values() if rotor != (None, None) and each.name in moved]:
+            joints[joint.child] = replace(joint, rotor=rotor)
 
 
 def outward_from(root: str, joints: Iterable[UrdfJoint]) -> list[UrdfJoint]:
@@ -242,7 +251,7 @@ def frame_at(xyz: Floats, rpy: Floats) -> Floats:
 
 def vector_in(element: ET.Element | None, key: str, default: str = ZERO) -> Floats:
     """Three numbers of an attribute; ValueError where it has others."""
-    value = numbers_in(_text(element, key, default), 3)
+    value = numbers_in(text_at(element, key) or default, 3)
     if value is None:
         raise ValueError(key)
     return value
@@ -253,109 +262,52 @@ def origin_of(element: ET.Element | None) -> Floats:
     return frame_at(vector_in(element, "xyz"), vector_in(element, "rpy"))
 
 
-def friction_of(dry: float, viscous: float) -> tuple[float, float] | None:
-    """Dry and viscous friction of a file's joint; None where it has none, or numbers that stand for none."""
-    return (dry, viscous) if min(dry, viscous) >= 0.0 and 0.0 < max(dry, viscous) < ENDLESS else None
-
-
-def rotor_of(element: ET.Element | None) -> tuple[float | None, float | None]:
-    """The inertia of a rotor [kg m²], and its gear, as Drake's elements in one say; None where they do not."""
-    said = [None if element is None else element.find(tag) for tag in ("rotor_inertia", "gear_ratio")]
-    values = [None if each is None else numbers_in(each.get("value") or each.text or "", 1) for each in said]
-    inertia, gear = (None if value is None else float(value[0]) for value in values)
-    return (inertia, gear) if inertia else (None, None)
-
-
-def _joint(element: ET.Element, retyped: Mapping[str, str]) -> UrdfJoint:
-    name, origin, limit = element.get("name", ""), element.find("origin"), element.find("limit")
-    acceleration = number(limit, "acceleration")
-    is_limited = limit is not None and ("lower" in limit.attrib or "upper" in limit.attrib)
-    limits = (number(limit, "lower"), number(limit, "upper"))
-    effort, losses = number(limit, "effort"), element.find("dynamics")
-    speed, kind = number(limit, "velocity"), retyped.get(name, element.get("type", "")).upper()
-    axis = vector_in(element.find("axis"), "xyz", X)
+def _joint(
+    element: ET.Element, links: Collection[str], names: Collection[str], retyped: Mapping[str, str], faults: list[Fault]
+) -> UrdfJoint:
+    name, kind = element.get("name", ""), element.get("type", "")
+    place = f"joint '{name}'"
+    if kind not in TYPES:
+        faults.append(Fault(place, f"type '{kind}'", f"one of {', '.join(TYPES)}"))
+    parent, child = (text_at(element, f"{end}/link") for end in ("parent", "child"))
+    for end, link in (("parent", parent), ("child", child)):
+        if link not in links:
+            faults.append(Fault(f"{place}.{end}", f"'{link}'{near_miss(link, links)}", "a link of the robot"))
+    said = read_fields(element, PLACED, place, faults)
+    if kind not in ("fixed", "floating", "ball", "spherical", "universal") and not said["axis"].any():
+        faults.append(Fault(f"{place}.axis", "no direction", "three numbers, not all zero"))
+    kind = retyped.get(name, kind).upper()
+    ends = (0.0, 0.0) if text_at(element, "limit/lower|limit/upper") else UNLIMITED
     return UrdfJoint(
         name,
         kind,
-        _link(element, "parent"),
-        _link(element, "child"),
-        origin_of(origin),
-        axes=HERE[:2, :3] if kind == "UNIVERSAL" else np.array([axis, axis]),
-        limits=limits if is_limited and kind in ("REVOLUTE", "PRISMATIC") else None,
-        max_speed=speed if speed > 0.0 else None,
-        max_acceleration=acceleration if 0.0 < acceleration < ENDLESS else None,
-        max_torque=effort if 0.0 < effort < ENDLESS else None,
-        friction=friction_of(number(losses, "friction"), number(losses, "damping")),
-        mimic=_coupling(name, element.find("mimic")),
-        written={"pos": _text(origin, "xyz", ZERO), "euler": _text(origin, "rpy", ZERO)},
+        parent,
+        child,
+        frame_at(said["xyz"], said["rpy"]),
+        axes=HERE[:2, :3] if kind == "UNIVERSAL" else np.array([said["axis"]] * 2),
+        mimic=coupling_of(name, element.find("mimic"), names, place, faults),
+        written={"pos": text_at(element, "origin/xyz") or ZERO, "euler": text_at(element, "origin/rpy") or ZERO},
+        **drive_of(kind, element, place, faults, ends),
     )
 
 
-def _coupling(name: str, mimic: ET.Element | None) -> Coupling | None:
-    if mimic is None:
-        return None
-    return Coupling(name, mimic.get("joint", ""), (number(mimic, "offset"), number(mimic, "multiplier", 1.0)))
-
-
-def _link(joint: ET.Element, end: str) -> str:
-    """Name of a joint's parent or child."""
-    return _text(joint.find(end), "link", "")
-
-
-def _text(element: ET.Element | None, key: str, default: str) -> str:
-    return default if element is None else element.get(key, default)
+def _axes_written(root: ET.Element) -> list[str]:
+    """The axes of all joints as the file writes them."""
+    return [text_at(joint, "axis/xyz") or X for joint in root.iterfind("joint")]
 
 
 def _roundings(
-    outward: Sequence[UrdfJoint], closing: Sequence[UrdfJoint], written: Mapping[str, ET.Element], root: str
+    outward: Sequence[UrdfJoint], closing: Sequence[UrdfJoint], axes_written: Sequence[str], root: str
 ) -> tuple[dict[str, Rounding], dict[str, Rounding]]:
     """Link, and joint -> how exactly the digits of the file place it [m, rad], from the root outward."""
     lengths, turns = (digits_of(each.written[key] for each in (*outward, *closing)) for key in ("pos", "euler"))
-    axes = digits_of(_text(each.find("axis"), "xyz", X) for each in written.values())
+    axes = digits_of(axes_written)
     of_links, of_joints = {root: NOTHING}, {}
     for joint in (*outward, *closing):
         offset, axis = joint.frame[:3, 3], joint.axes[0]
-        angle = turns.error(vector_in(written[joint.name].find("origin"), "rpy"), FEWEST - 1)
+        angle = turns.error([float(word) for word in joint.written["euler"].split()], FEWEST - 1)
         rounding = of_links[joint.parent].on(offset, lengths.error(offset), angle)
         of_links.setdefault(joint.child, rounding)
         skew = axes.error(axis) / np.linalg.norm(axis) if np.count_nonzero(axis) > 1 else 0.0
         of_joints[joint.name] = rounding._replace(angle=rounding.angle + float(skew))
     return of_links, of_joints
-
-
-def _faults(root: ET.Element) -> Iterator[Fault]:
-    """Yield what keeps the links and joints from being read, each at its joint."""
-    links = Counter(link.get("name", "") for link in root.iterfind("link"))
-    names = Counter(joint.get("name", "") for joint in root.iterfind("joint"))
-    for what, listed in (("link", links), ("joint", names)):
-        for name in sorted(name for name, count in listed.items() if not name or count > 1):
-            yield Fault(f"{what} '{name}'", "a name that is empty, or used twice", "a name of its own")
-    for joint in root.iterfind("joint"):
-        place, kind = f"joint '{joint.get('name', '')}'", joint.get("type", "")
-        if kind not in TYPES:
-            yield Fault(place, f"type '{kind}'", f"one of {', '.join(TYPES)}")
-        for end in ("parent", "child"):
-            link = _link(joint, end)
-            if link not in links:
-                yield Fault(f"{place}.{end}", f"'{link}'{near_miss(link, links)}", "a link of the robot")
-        for tag in ("origin", "axis", "limit"):
-            element = joint.find(tag)
-            for key, text in () if element is None else element.attrib.items():
-                count = 3 if key in ("xyz", "rpy") else 1
-                if numbers_in(text, count) is None:
-                    yield Fault(f"{place}.{tag}.{key}", f"'{text}'", f"{count} finite numbers{XACRO * ('$' in text)}")
-        yield from _mimic_faults(place, joint.find("mimic"), names)
-        axis = numbers_in(_text(joint.find("axis"), "xyz", X), 3)
-        if kind not in ("fixed", "floating", "ball", "spherical", "universal") and (axis is None or not axis.any()):
-            yield Fault(f"{place}.axis", "no direction", "three numbers, not all zero")
-
-
-def _mimic_faults(place: str, mimic: ET.Element | None, names: Mapping[str, int]) -> Iterator[Fault]:
-    if mimic is None:
-        return
-    leader = mimic.get("joint", "")
-    if leader not in names:
-        yield Fault(f"{place}.mimic.joint", f"'{leader}'{near_miss(leader, names)}", "a joint of the robot")
-    for key in ("multiplier", "offset"):
-        if numbers_in(mimic.get(key, "0"), 1) is None:
-            yield Fault(f"{place}.mimic.{key}", f"'{mimic.get(key)}'", "a number")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Literal
@@ -15,6 +16,7 @@ from ...common.arrays import Floats
 from ...common.checks import require_path
 from ...errors import Fault, InvalidArgument, InvalidMechanism
 from ...machine.description.form_faults import shown
+from ...machine.files.reading import MOST_JOINTS
 
 LARGEST = 10_000_000
 """Largest text read [bytes], all included files together: a humanoid with every bolt has 1 MB."""
@@ -30,6 +32,27 @@ OF_XML = ("xmlns", "xml", "xsi")
 """Prefixes of attributes that say something of the text, and nothing of the model."""
 
 MOST_ELEMENTS, MOST_INCLUDED = 200_000, 20
+
+MOST_OF = {
+    **dict.fromkeys(("links", "bodies", "frames", "fixed joints"), 5_000),
+    "joints": MOST_JOINTS,
+    "loops": 100,
+    **dict.fromkeys(("sites", "geoms"), 20_000),
+    "elements": MOST_ELEMENTS,
+}
+"""Most parts of a robot: of a humanoid with every bolt, ten times; joints as of a mechanism's file."""
+
+PARTS = {
+    "link": "links",
+    "body": "bodies",
+    "frame": "frames",
+    "site": "sites",
+    "geom": "geoms",
+    "joint": "joints",
+    "freejoint": "joints",
+    **dict.fromkeys(("connect", "weld", "spatial", "loop_joint", "constraint", "loop"), "loops"),
+}
+"""Tag -> what it is counted as."""
 
 
 def read_xml(source: str | os.PathLike[str], *kinds: Kind) -> ET.Element:
@@ -58,7 +81,24 @@ def read_xml(source: str | os.PathLike[str], *kinds: Kind) -> ET.Element:
     kind = _kind(tree, "text" if folder is None else str(source), kinds)
     if kind == "mjcf":
         _include(tree, folder, budget, () if folder is None else (Path(source).resolve(),))
+    _require_few(tree, "text" if folder is None else str(source))
     return tree
+
+
+def _require_few(tree: ET.Element, place: str) -> None:
+    """Refuse a model of more parts than any has, before anything is made of it."""
+    counts, waiting = Counter[str](), [(tree, 1)]
+    while waiting:
+        element, copies = waiting.pop()
+        if element.tag == "replicate":
+            copies *= max(1, int(number(element, "count")))
+        part = PARTS.get(element.tag, "")
+        counts[f"fixed {part}" if element.get("type") == "fixed" else part] += copies
+        counts["elements"] += copies
+        waiting += [(child, copies) for child in element]
+    for part, most in MOST_OF.items():
+        if counts[part] > most:
+            raise fault(place, f"{counts[part]} {part}, with all copies", f"at most {most}")
 
 
 def kind_of(path: str | os.PathLike[str]) -> Kind:
@@ -80,13 +120,18 @@ def _kind(tree: ET.Element, place: str, kinds: tuple[Kind, ...]) -> Kind:
     return KINDS[tree.tag]
 
 
-def numbers_in(text: str, count: int) -> Floats | None:
-    """The numbers of a text, with blanks between them, (count,); None where it has others, or not finite ones."""
+def numbers_in(text: str, count: int, endless: bool = False) -> Floats | None:
+    """The numbers of a text, with blanks between them, (count,); None where it has others.
+
+    Parameters
+    ----------
+    endless : True where they may be infinite.
+    """
     try:
         values = np.array([float(word) for word in text.split()])
     except ValueError:
         return None
-    return values if values.shape == (count,) and np.isfinite(values).all() else None
+    return values if values.shape == (count,) and (np.isfinite(values) | (endless & np.isinf(values))).all() else None
 
 
 def number_text(values: Iterable[float]) -> str:

@@ -124,8 +124,12 @@ def _bracketed(
     return total
 
 
-def unclear_conditions(mechanism: Structure) -> list[float]:
+def unclear_conditions(mechanism: Structure, below: float = TOLERANCES.nearly_implied) -> list[float]:
     """By how much conditions of the loops at home fail to follow from the others, and yet hardly are their own.
+
+    Parameters
+    ----------
+    below : singular value from which on a condition is one of its own [L and rad].
 
     Returns
     -------
@@ -135,17 +139,17 @@ def unclear_conditions(mechanism: Structure) -> list[float]:
     """
     _, closure = _home_motion(mechanism, frozenset())
     values = np.linalg.svd(closure, compute_uv=False) if closure.size else np.zeros(0)
-    unclear = (values > TOLERANCES.implied) & (values < TOLERANCES.nearly_implied)
+    unclear = (values > TOLERANCES.implied) & (values < below)
     return [float(value) for value in values[unclear]]
 
 
-def unclear_joints(mechanism: Structure) -> frozenset[int]:
+def unclear_joints(mechanism: Structure, below: float = TOLERANCES.nearly_implied) -> frozenset[int]:
     """Indices of the joints in the loops whose conditions `unclear_conditions` finds."""
     _, closure = _home_motion(mechanism, frozenset())
     if not closure.size:
         return frozenset()
     left, values, _ = np.linalg.svd(closure, full_matrices=False)
-    unclear = left[:, (values > TOLERANCES.implied) & (values < TOLERANCES.nearly_implied)]
+    unclear = left[:, (values > TOLERANCES.implied) & (values < below)]
     loops = tree_of(mechanism).loops
     parts = np.abs(unclear).reshape(len(loops), -1).max(axis=1, initial=0.0)
     return frozenset(np.flatnonzero(loops[parts > TOLERANCES.alignment].any(axis=0)).tolist())

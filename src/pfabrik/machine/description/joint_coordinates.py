@@ -35,6 +35,11 @@ class JointCoordinate:
     home: float
 
     @property
+    def alias(self) -> str:
+        """The hinge that it was where two became one, `roll` of the second of `pitch+roll`; else its name."""
+        return self.joint.merged[self.place] if self.joint.merged else self.name
+
+    @property
     def kind(self) -> Coordinate:
         """Its kind: an angle or a length."""
         return KINDS[self.joint.type].coordinates[self.place]

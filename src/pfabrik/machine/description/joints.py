@@ -220,6 +220,12 @@ class Joint:
         return driven_places(self.type, self.actuated)
 
     @property
+    def merged(self) -> tuple[str, ...]:
+        """Names of the two hinges that a universal joint was made of, `pitch` and `roll` of `pitch+roll`; else none."""
+        parts = tuple(self.name.split("+")) if self.type == "universal" else ()
+        return parts if len(parts) == 2 and all(parts) else ()
+
+    @property
     def is_rigid(self) -> bool:
         """True if its two bodies are as one: it is fixed, or a passive R or P whose range is a single value."""
         if self.type not in ("revolute", "prismatic") or self.actuated or self.range is None:

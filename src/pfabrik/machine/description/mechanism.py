@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -302,7 +303,8 @@ class Mechanism(Structure):
         Parameters
         ----------
         limits : mapping of str to tuple or Cone or None, optional
-            Joint name -> its new range, its new cone, or None to drop both. What is not named stays.
+            Joint name -> its new range, its new cone, or None to drop both. What is not named stays. Of a universal
+            joint that two hinges of a file became, the name of a hinge -> its new range.
         **by_name : tuple or Cone or None
             The same by keywords.
 
@@ -314,12 +316,12 @@ class Mechanism(Structure):
             A limit that does not fit its joint, or that home exceeds.
         """
         changes = {**require_mapping("limits", limits, "limits by the names of joints"), **by_name}
-        for name in changes:
-            self.joint(name)
+        changed = {joint.name: joint for joint in self.joints}
+        for name, limit in changes.items():
+            joint = changed[self.joint(name).name]
+            changed[joint.name] = _limited(joint, limit if name == joint.name else _of_hinge(joint, name, limit))
         try:
-            return self._with_joints(
-                _limited(joint, changes[joint.name]) if joint.name in changes else joint for joint in self.joints
-            )
+            return self._with_joints(changed.values())
         except InvalidMechanism as error:
             raise InvalidMechanism([self._by_its_joint(fault) for fault in error.faults]) from None
 
@@ -402,6 +404,15 @@ def told_apart(other: Mechanism, mechanism: Mechanism) -> str:
     joints = [joint.name for joint in other.joints if joint not in same]
     differ = f"joint{'s' * (len(joints) > 1)} {', '.join(joints[:5])}{', ...' * (len(joints) > 5)}"
     return f"another mechanism of the same name, '{other.name}'{f', with other {differ}' if joints else ''}"
+
+
+def _of_hinge(joint: Joint, hinge: str, limit: Any) -> Any:
+    """The ranges of a universal joint with another one for one of the two hinges that it was made of."""
+    if limit is None or isinstance(limit, Cone):
+        raise InvalidArgument(f"limits['{hinge}']", str(limit), f"a range; None or a cone is for '{joint.name}'")
+    ranges = list(joint.range or ((-math.inf, math.inf),) * 2)
+    ranges[joint.merged.index(hinge)] = limit
+    return ranges
 
 
 def _limited(joint: Joint, limit: Limit) -> Joint:

@@ -116,6 +116,11 @@ class Structure:
         return tuple(found)
 
     @cached_property
+    def coordinates_by_name(self) -> dict[str, JointCoordinate]:
+        """Name of each coordinate, and of the hinge that it was where two became one -> the coordinate."""
+        return {each.alias: each for each in self.coordinates} | {each.name: each for each in self.coordinates}
+
+    @cached_property
     def drives(self) -> tuple[JointCoordinate, ...]:
         """The actuated coordinates, in the order of `actuator_names`."""
         return tuple(each for each in self.coordinates if each.place in each.joint.driven)
@@ -182,12 +187,13 @@ class Structure:
 
     @cached_property
     def _by_name(self) -> dict[str, Joint]:
-        return {joint.name: joint for joint in self.joints}
+        hinges = {name: joint for joint in self.joints for name in joint.merged}
+        return hinges | {joint.name: joint for joint in self.joints}
 
     def joint(self, name: str) -> Joint:
-        """The joint of that name; `UnknownName` if there is none."""
+        """The joint of that name, or that a hinge of that name is part of; `UnknownName` if there is none."""
         if not isinstance(name, str) or name not in self._by_name:
-            raise UnknownName("joint", name, self._by_name)
+            raise UnknownName("joint", name, [joint.name for joint in self.joints])
         return self._by_name[name]
 
     def home_coordinate(self, name: str) -> float | tuple[float, ...]:

@@ -167,10 +167,8 @@ def _computed(
                 hint = "; it comes later" if name in later else near_miss(name, values)
                 raise NoNumber(f"no dimension '{name}' here{hint}")
             return values[name]
-        case ast.UnaryOp(op=ast.USub(), operand=operand):
-            return -compute(operand)
-        case ast.UnaryOp(op=ast.UAdd(), operand=operand):
-            return compute(operand)
+        case ast.UnaryOp(op=ast.USub() | ast.UAdd() as sign, operand=operand):
+            return compute(operand) if isinstance(sign, ast.UAdd) else -compute(operand)
         case ast.BinOp(op=operation, left=left, right=right) if type(operation) in _OPERATORS:
             return _OPERATORS[type(operation)](compute(left), compute(right))
         case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in functions:

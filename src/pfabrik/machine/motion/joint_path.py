@@ -11,7 +11,7 @@ and the pose is T_base_platform = D(q) T_home. The sign is -1 for a joint whose 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -53,7 +53,7 @@ def named_coordinates(mechanism: Mechanism, names: tuple[str, ...]) -> list[Join
     """The coordinates that names of joints or coordinates stand for, in their order."""
     if not names:
         raise InvalidArgument("joints", "no joint", _expected(mechanism))
-    by_name = {each.name: [each] for each in mechanism.coordinates}
+    by_name = {name: [replace(each, name=name)] for name, each in mechanism.coordinates_by_name.items()}
     for joint in mechanism.joints:
         by_name[joint.name] = [each for each in mechanism.coordinates if each.joint.name == joint.name]
     for name in names:
@@ -62,7 +62,8 @@ def named_coordinates(mechanism: Mechanism, names: tuple[str, ...]) -> list[Join
         if not by_name[name]:
             raise InvalidArgument("joints", f"'{name}', which is fixed", "joints that move")
     named = [each for name in names for each in by_name[name]]
-    twice = [each.name for place, each in enumerate(named) if each in named[:place]]
+    columns = [each.column for each in named]
+    twice = [each.name for place, each in enumerate(named) if each.column in columns[:place]]
     if twice:
         raise InvalidArgument("joints", f"'{twice[0]}' twice", "each joint once")
     return named

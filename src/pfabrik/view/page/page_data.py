@@ -127,7 +127,7 @@ class _Reading(NamedTuple):
     no_slopes: Floats  # (0, 0, 0)
 
 
-def _records(model: Model, options: Options) -> dict[str, tuple[Any, ...]]:
+def _records(model: Model, options: Options) -> dict[str, Any]:
     """The arguments of kernels, by their names in the page."""
     tables = tables_of(model, options)
     legs, actuators = tables.legs.legs.shape[0], tables.home.actuators.shape[1]

@@ -98,6 +98,45 @@ def rotary_delta(radius: float, arms: Three) -> Table:
     return _machine("Rotary delta printer", dimensions, joints, "home_height")
 
 
+def deltesian(arms: Mapping[str, Sequence[float]], lowest: float, y: tuple[float, float]) -> Table:
+    """Two carriages on upright towers, left and right, and a slide along y, with the nozzle in the middle at home.
+
+    A carriage is at sqrt(arm_length² - (x ± arm_x_length)²) + z. The left arm is a parallelogram, which keeps the
+    platform level; in the firmware nothing tells which arm is.
+
+    Parameters
+    ----------
+    arms : "arm_x_length", "arm_length" and "position_endstop" [mm], of the left arm, and of the right one.
+    lowest : of carriages [mm].
+    y : range of the slide [mm].
+    """
+    width = max(arms["arm_x_length"])
+    at_y = min(max(0.0, y[0]), y[1])
+    dimensions: Table = {"platform_radius": round(SHOWN * width, 1), "apart": round(2.0 * SHOWN * width, 1)}
+    joints: list[Table] = []
+    for k, (side, sign) in enumerate((("left", "-"), ("right", ""))):
+        dimensions |= {f"{name}_{side}": float(values[k]) for name, values in arms.items()}
+        out, arm, height = f"arm_x_length_{side}", f"arm_length_{side}", f"height_{side}"
+        _require_rail(arms["arm_x_length"][k], side, {name: values[k] for name, values in arms.items()}, lowest)
+        dimensions[height] = f"sqrt({arm}**2 - {out}**2)"
+        rail = {"home": height, "range": [lowest, f"{height} + position_endstop_{side}"]}
+        slide = {"type": "prismatic", "actuated": True, "connects": ["gantry", f"slide_{side}"], "axis": [0, 0, 1]}
+        joints.append({"name": f"carriage_{side}"} | slide | rail)
+        for rod, above in (("", "0"), ("_upper", "apart"))[: 2 if side == "left" else 1]:
+            ends = [f"slide_{side}", f"rod_{side}{rod}", "platform"]
+            places = [(f"{sign}({out} + platform_radius)", f"{height} + {above}"), (f"{sign}platform_radius", above)]
+            hinges = [
+                {"name": f"{end}_{side}{rod}", "type": "revolute", "connects": ends[n : n + 2], "at": [x, at_y, z]}
+                for n, (end, (x, z)) in enumerate(zip(("upper", "lower"), places, strict=True))
+            ]
+            turn = {"axis": [0, 1 if side == "left" else -1, 0]}
+            leaning = {"home": f"atan2({out}, {height})", "range": [-90, 90]} if not rod else {}
+            joints += [hinges[0] | turn, hinges[1] | turn | leaning]
+    along = {"type": "prismatic", "actuated": True, "connects": ["base", "gantry"], "axis": [0, 1, 0]}
+    joints.append({"name": "carriage_y"} | along | {"home": at_y, "range": [*y]})
+    return _machine("Deltesian printer", dimensions, joints, 0) | {"reference_point": [0, at_y, 0]}
+
+
 def counted_from_endstops(table: Table, tops: Mapping[str, float]) -> Table:
     """The same machine with its actuators counted as steps are: at its endstop each has a value that never changes.
 

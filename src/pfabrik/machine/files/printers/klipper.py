@@ -13,7 +13,7 @@ from pathlib import Path
 
 from ....errors import InvalidMechanism
 from ..texts import text_of
-from .deltas import LOOPLESS, TOWERS, Table, fault, linear_delta, rotary_delta
+from .deltas import LOOPLESS, TOWERS, Table, deltesian, fault, linear_delta, rotary_delta
 from .print_region import PrintRegion
 
 _INCLUDE = re.compile(r"^\[include +([^\]]+)\]", re.MULTILINE)
@@ -132,7 +132,7 @@ def settings_of(text: str, folder: Path | None) -> KlipperSettings | None:
 
 
 def klipper_table(text: str, folder: Path | None) -> Table:
-    """The machine of a `printer.cfg`: kinematics delta, with the carriages' heights, or rotary_delta, with angles."""
+    """The machine of a `printer.cfg`: kinematics delta or deltesian, with the carriages' heights, or rotary_delta."""
     return _machine_of(KlipperSettings(text, folder))
 
 
@@ -155,8 +155,10 @@ def _machine_of(settings: KlipperSettings) -> Table:
         return _delta_of(settings)
     if kinematics == "rotary_delta":
         return _rotary_delta_of(settings)
+    if kinematics == "deltesian":
+        return _deltesian_of(settings)
     found = "nothing" if kinematics is None else f"'{kinematics}', {LOOPLESS}"
-    raise fault("[printer] kinematics", found, "delta or rotary_delta")
+    raise fault("[printer] kinematics", found, "delta, rotary_delta or deltesian")
 
 
 def _delta_of(settings: KlipperSettings) -> Table:
@@ -169,6 +171,21 @@ def _delta_of(settings: KlipperSettings) -> Table:
     }
     lowest = settings.number("printer", "minimum_z_position", 0.0)
     return linear_delta(radius, towers, lowest)
+
+
+def _deltesian_of(settings: KlipperSettings) -> Table:
+    """The machine of kinematics deltesian; see `deltesian`."""
+
+    def of_sides(key: str, above: float = -math.inf) -> list[float]:
+        left = settings.number("stepper_left", key, above=above)
+        return [left, settings.number("stepper_right", key, left, above)]
+
+    keys = {"arm_x_length": 0.0, "arm_length": 0.0, "position_endstop": -math.inf}
+    lowest = settings.number("printer", "minimum_z_position", 0.0)
+    y = settings.number("stepper_y", "position_min", 0.0), settings.number("stepper_y", "position_max")
+    if not y[0] < y[1]:
+        raise fault("[stepper_y] position_max", f"{y[1]:g}", f"a number above position_min, {y[0]:g}")
+    return deltesian({key: of_sides(key, above) for key, above in keys.items()}, lowest, y)
 
 
 def _rotary_delta_of(settings: KlipperSettings) -> Table:

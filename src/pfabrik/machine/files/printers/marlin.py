@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..dimensions import NoNumber, number_of
+from .conditions import definitions
 from .deltas import LOOPLESS, Table, fault, linear_delta
 from .print_region import PrintRegion
 
@@ -27,8 +28,6 @@ PROBES = (
 )
 """Definitions of a probe, whose offset counts in the homed height."""
 
-_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
-_DEFINITION = re.compile(r"^[ \t]*#[ \t]*define[ \t]+(\w+)(?![\w(])[ \t]*(.*?)[ \t]*$", re.MULTILINE)
 _NONE = (0.0, 0.0, 0.0)
 
 
@@ -82,14 +81,10 @@ def marlin_region(text: str, folder: Path | None) -> PrintRegion:
 
 
 class _Definitions:
-    """The `#define`s of a file. Conditions are not followed: a name that is defined twice has to say the same."""
+    """The `#define`s of a file, in branches that hold; a name that is defined twice has to say the same."""
 
     def __init__(self, text: str) -> None:
-        self.texts: dict[str, str] = {}
-        self._twice: set[str] = set()
-        for name, value in _DEFINITION.findall(_COMMENT.sub(" ", text)):
-            if self.texts.setdefault(name, value) != value:
-                self._twice.add(name)
+        self.texts, self._twice = definitions(text)
 
     def number(self, name: str, otherwise: str | None = None) -> float:
         """The value of a name, or of an older way to say it."""
@@ -109,7 +104,7 @@ class _Definitions:
 
     def _text_of(self, name: str) -> str:
         if name in self._twice:
-            raise fault(f"#define {name}", "two values, and #if is not followed here", "the one that holds")
+            raise fault(f"#define {name}", "two values, and names of another file say which", "the one that holds")
         return self.texts[name]
 
     def _value(self, place: str, said: str, within: tuple[str, ...]) -> float:
