@@ -41,8 +41,8 @@ DOUBLED = 0.1
 THINNEST = 0.1
 """Least radius of gyration of a body [L]: a light body that turns easily would need shorter steps."""
 
-WEIGHTLESS = 1e-6
-"""Mass of a body that weighs nothing, over that of the heaviest: MuJoCo moves none without."""
+WEIGHTLESS = 1e-3
+"""Mass of a body that weighs nothing, over that of the heaviest: a model with less than that blows up."""
 
 POINT = 1e-5
 """Radius of gyration of a point and about the line of a rod [L]: MuJoCo turns nothing without, and none sees it."""
@@ -64,6 +64,7 @@ class Physics:
     masses : body -> its mass [kg].
     made_up : moving bodies whose masses neither the caller gave nor the mechanism has.
     weightless : those that weigh nothing in the mechanism.
+    is_solid : True if all of them have mass, and moments of inertia about every axis, in the mechanism.
     known : what bodies weigh of which the mechanism has it, lengths in its unit.
     length : the characteristic length [m].
     heaviest : the largest of the masses, which any servo can carry [kg].
@@ -72,6 +73,7 @@ class Physics:
     masses: Mapping[str, float]
     made_up: tuple[str, ...]
     weightless: tuple[str, ...]
+    is_solid: bool
     known: Mapping[str, BodyInertia]
     length: float
     heaviest: float
@@ -100,19 +102,23 @@ class Physics:
         return {"kp": carried * SERVO_RATE**2, "kv": 2.0 * carried * SERVO_RATE}
 
     def joint(self, turning: bool, drive: JointCoordinate | None = None) -> dict[str, float]:
-        """Armature and friction as the mechanism has them; made up of what it does not say while masses are.
+        """Armature and friction: those that the mechanism has, else made up if masses are.
 
-        Stiff servos on light bodies of any mass blow up without an armature.
+        An armature is made up as well where a driven body may be a point or weigh nothing: a stiff servo on a light
+        body blows up without.
 
         Parameters
         ----------
-        drive : what is driven; None of a passive joint, which has neither.
+        drive : the coordinate, if it is driven: a passive one has neither in the mechanism.
         """
-        carried = self.carried(turning) if self.made_up else 0.0
-        armature, friction = (None, None) if drive is None else (drive.armature, drive.said("friction"))
-        dry, viscous = (0.0, 0.02 * carried) if friction is None else friction
-        made_up = (0.01 if drive is None else 0.2) * carried
-        said = {"armature": made_up if armature is None else armature, "frictionloss": dry, "damping": viscous}
+        carried = self.carried(turning)
+        made_up = carried if self.made_up else 0.0
+        armature, friction = 0.01 * made_up, (0.0, 0.02 * made_up)
+        if drive is not None:
+            unsaid = 0.0 if self.is_solid else 0.2 * carried
+            armature = unsaid if drive.armature is None else drive.armature
+            friction = drive.said("friction") or friction
+        said = {"armature": armature, "frictionloss": friction[0], "damping": friction[1]}
         return {name: value for name, value in said.items() if value}
 
 
@@ -146,7 +152,9 @@ def physics(mechanism: Mechanism, metres: float, masses: Mapping[str, float] | N
     heaviest = max(every[body] for body in moving) or whole
     every |= dict.fromkeys(weightless, WEIGHTLESS * heaviest)
     made_up = tuple(body for body in moving if body not in said and body not in given)
-    return Physics(every, made_up, weightless, known, length, heaviest)
+    has_points = any(np.linalg.eigvalsh(known[body].inertia)[0] <= 0.0 for body in moving if body in known)
+    is_solid = not (made_up or weightless or has_points)
+    return Physics(every, made_up, weightless, is_solid, known, length, heaviest)
 
 
 SLIDING = ("prismatic", "cylindrical")

@@ -17,7 +17,7 @@ from ...machine.description.joints import DRIVE_FIELDS
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.files.units import MEASURED, metres_of
 from .cuts import CutTree, cut_tree
-from .mjcf_bodies import STEP, Names, Physics, as_attributes, bodies, names_of, physics, si_unit, strut_notes
+from .mjcf_bodies import STEP, WEIGHTLESS, Names, Physics, as_attributes, bodies, names_of, physics, si_unit, strut_notes
 from .xml_reading import number_text
 
 NOTE = "pfabrik."
@@ -50,7 +50,8 @@ def to_mjcf(
     range. Pairs of `ignore` are `exclude`. Cones, which MuJoCo does not know, are in comments and in custom elements,
     as are base, end effector and task, what drives can do, struts, and the clearance. Of drives, armature (the inertia
     of a rotor by the square of its gear), friction, and the most that they exert are those of the mechanism; where it
-    lacks the mass of a body, what it does not say of them is made up, for servos to be stable, and comments say so.
+    lacks the mass of a body, what it does not say of them is made up, for servos to be stable, and comments say so;
+    armature also where a body is a point or weighs nothing.
 
     Parameters
     ----------
@@ -60,7 +61,7 @@ def to_mjcf(
         The file to write; None writes none.
     masses : mapping of str to float, optional
         Body -> its mass [kg]. Others are those of the mechanism, or made up, in proportion to it: what the model
-        weighs, and so every force in it, means nothing until they are given. What weighs nothing has a millionth of
+        weighs, and so every force in it, means nothing until they are given. What weighs nothing has a thousandth of
         the heaviest, and a point the least inertia that MuJoCo can turn.
     gravity : array (3,), optional
         Gravity [m/s²]; none by default, for with masses made up, its forces would be too.
@@ -121,14 +122,14 @@ def _comments(mechanism: Mechanism, physics: Physics) -> Iterator[str]:
     yield f"'{mechanism.name}', written by pfabrik: lengths in m, where its own file has {mechanism.length_unit}"
     if physics.made_up:
         yield f"masses are made up, in proportion to the machine, of {', '.join(physics.made_up)}"
-        unsaid = [drive.name for drive in mechanism.drives if drive.armature is None]
-        unbraked = [drive.name for drive in mechanism.drives if drive.said("friction") is None]
-        passive = " and of passive joints" if len(mechanism.drives) < len(mechanism.coordinates) else ""
-        for what, names in (("armature", unsaid), ("damping", unbraked)):
-            if names or passive:
-                yield f"{what} is made up, as masses are{', of ' * bool(names)}{', '.join(names)}{passive}"
+        yield "armature and damping of passive joints are made up"
+        if unbraked := [drive.name for drive in mechanism.drives if drive.said("friction") is None]:
+            yield f"damping is made up of {', '.join(unbraked)}"
+    unsaid = [drive.name for drive in mechanism.drives if drive.armature is None]
+    if unsaid and not physics.is_solid:
+        yield f"armature is made up of {', '.join(unsaid)}"
     if physics.weightless:
-        yield f"bodies that weigh nothing are as light as MuJoCo can move: {', '.join(physics.weightless)}"
+        yield f"bodies that weigh nothing have {WEIGHTLESS:g} of the heaviest: {', '.join(physics.weightless)}"
     for joint in mechanism.joints:
         if joint.cone is not None:
             half_angle = f"{np.degrees(joint.cone.half_angle):.6g} deg"
