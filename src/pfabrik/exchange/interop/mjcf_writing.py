@@ -17,7 +17,18 @@ from ...machine.description.joints import DRIVE_FIELDS
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.files.units import MEASURED, metres_of
 from .cuts import CutTree, cut_tree
-from .mjcf_bodies import STEP, WEIGHTLESS, Names, Physics, as_attributes, bodies, names_of, physics, si_unit, strut_notes
+from .mjcf_bodies import (
+    STEP,
+    WEIGHTLESS,
+    Names,
+    Physics,
+    as_attributes,
+    bodies,
+    names_of,
+    physics,
+    si_unit,
+    strut_notes,
+)
 from .xml_reading import number_text
 
 NOTE = "pfabrik."

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -94,29 +94,35 @@ def merged_balls(joints: Sequence[Joint]) -> list[Joint]:
     return [joint for joint in replaced if joint is not None]
 
 
-def combined(joints: Sequence[Joint], kept: set[str], notes: list[Note]) -> list[Joint]:
+def combined(joints: Sequence[Joint], kept: Collection[str], notes: list[Note]) -> tuple[list[Joint], dict[str, str]]:
     """Two joints with nothing else on the body between them as one joint, unless that body is to be kept.
 
     Two passive hinges whose axes cross are a universal joint. J[0] and J[1], a hinge and a slide along it, are a
     cylindrical joint J: as this library writes it.
+
+    Returns
+    -------
+    tuple : the joints; and body that is within one of them -> the body behind it.
     """
     on_body: dict[str, list[Joint]] = defaultdict(list)
     for joint in joints:
         for body in joint.connects:
             on_body[body].append(joint)
     made = {joint.name: joint for joint in joints}
-    crossing = []
+    crossing: list[str] = []
+    within: dict[str, str] = {}
     for between, pair in on_body.items():
         if len(pair) != 2 or between in kept or not all(made.get(joint.name) is joint for joint in pair):
             continue
         first, second = sorted(pair, key=lambda joint: joint.name.endswith("[1]"))
         one = _combination(first, second, between)
         if one is not None:
+            within[between] = one.connects[1]
             made = {name: one if each is first else each for name, each in made.items() if each is not second}
             if one.name not in (_stem(first), _stem(second)):
                 crossing.append(one.name)
     note_names(notes, "hinges whose axes cross are a universal joint", crossing)
-    return list(made.values())
+    return list(made.values()), within
 
 
 def _combination(first: Joint, second: Joint, between: str) -> Joint | None:

@@ -14,7 +14,6 @@ from ...machine.description.mechanism import Mechanism
 from .mjcf_bodies import axes_of, si_unit
 from .xml_reading import number_text
 
-
 DRAKE = "drake"
 """Prefix of what Drake's dialect adds to URDF: highest accelerations, rotors and gears."""
 

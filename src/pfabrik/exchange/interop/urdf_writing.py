@@ -15,9 +15,9 @@ from ...common.arrays import Floats
 from ...common.whole_files import whole_path
 from ...errors import InvalidArgument
 from ...kinematics import columns
-from ...machine.description.joint_coordinates import JointCoordinate
 from ...machine.description.body_inertias import inertias_of
 from ...machine.description.body_masses import as_moments
+from ...machine.description.joint_coordinates import JointCoordinate
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.files.units import metres_of
 from .cuts import Branch, CutTree, cut_tree
