@@ -67,14 +67,14 @@ def somewhere(machine: pf.Mechanism, seed: int = 5) -> Any:
     return solution, rates, 3.0 * gains
 
 
-def by_mujoco(machine: pf.Mechanism, solution: pf.Solution, rates: Any, gains: Any, gravity: Any) -> Any:
-    """Actuator forces and mass matrix of the exported model, by its constraint rows; their rate by differences."""
+def by_mujoco(text: str, start: Any, rates: Any, gains: Any) -> Any:
+    """Actuator forces and mass matrix of a closed model, by its constraint rows; their rate by differences."""
     mujoco = pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_string(pf.interop.to_mjcf(machine, gravity=gravity))
+    model = mujoco.MjModel.from_xml_string(text)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     model.site_sameframe[:] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
-    data, start = mujoco.MjData(model), pf.interop.qpos(solution)
+    data = mujoco.MjData(model)
 
     def rows(qpos: Any) -> Any:
         data.qpos[:] = qpos
@@ -120,7 +120,8 @@ def test_efforts_and_mass_matrices_are_mujocos(name: str) -> None:
     solution, rates, gains = somewhere(machine)
     rates, gravity = rates * (name in WITHOUT_IDLE), (1.0, -2.0, -9.0)  # how fast what is idle spins is a choice
     found = pf.inverse_dynamics(solution, twists=rates, accelerations=gains, at="actuators", gravity=gravity)
-    forces, mass = by_mujoco(machine, solution, *units(machine)[1] * [rates, gains], gravity)
+    text = pf.interop.to_mjcf(machine, gravity=gravity)
+    forces, mass = by_mujoco(text, pf.interop.qpos(solution), *units(machine)[1] * [rates, gains])
     assert found.reason == ""
     np.testing.assert_allclose(found.actuators, forces, atol=1e-9 * np.abs(forces).max())
     np.testing.assert_allclose(pf.mass_matrix(solution, "actuators"), mass, atol=1e-9 * np.abs(mass).max())

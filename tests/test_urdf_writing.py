@@ -84,12 +84,8 @@ def test_masses_and_motors_come_back(name: str) -> None:
     solution, rates, gains = somewhere(machine)
     from_home = solution.actuators - [drive.home for drive in machine.drives]
     here = pf.solve_fk(again, from_home)
-    efforts = [
-        pf.inverse_dynamics(
-            each, twists=0.0 * rates, accelerations=gains, at="actuators", gravity=(1, -2, -9)
-        ).actuators
-        for each in (solution, here)
-    ]
+    motion: dict[str, Any] = {"twists": 0.0 * rates, "accelerations": gains, "gravity": (1.0, -2.0, -9.0)}
+    efforts = [pf.inverse_dynamics(each, at="actuators", **motion).actuators for each in (solution, here)]
     np.testing.assert_allclose(efforts[1], efforts[0], atol=1e-9 * np.abs(efforts[0]).max())
 
 
