@@ -23,7 +23,10 @@ SKEW = 0.1
 
 
 def prune(opened: OpenMechanism, notes: list[Note]) -> OpenMechanism:
-    """The machine with only those joints and loops on which the end effector's motion against the base depends."""
+    """The machine with only those joints and loops on which the end effector's motion against the base depends.
+
+    What hangs on one of its bodies by the others is held where it is: its mass is of that body.
+    """
     edges = edges_between(opened.joints, opened.loops)
     tips = [edge for edge in edges if edge.joint.name == opened.end_effector]
     body = tips[0].bodies[0] if tips else opened.end_effector
@@ -35,7 +38,19 @@ def prune(opened: OpenMechanism, notes: list[Note]) -> OpenMechanism:
     note_names(notes, "left out, for the end effector does not depend on them", omitted)
     joints = tuple(joint for joint in opened.joints if joint.name in names)
     loops = tuple(loop for loop in opened.loops if loop.name in names)
-    return dataclasses.replace(opened, joints=joints, loops=loops)
+    pruned = dataclasses.replace(opened, joints=joints, loops=loops)
+    return _carrying(pruned, [edge.joint for edge in edges if edge.joint.name in omitted], notes)
+
+
+def _carrying(opened: OpenMechanism, omitted: Sequence[Joint], notes: list[Note]) -> OpenMechanism:
+    """The machine with the masses of bodies that hang on its own by joints that are left out."""
+    bodies = dict.fromkeys(body for edge in edges_between(opened.joints, opened.loops) for body in edge.bodies)
+    hung = welded(omitted, opened.base, *bodies)
+    carried = {each.body: None for each in opened.collision.masses if each.mass > 0.0 and each.body in hung}
+    names = [body for body in carried if hung[body] != opened.base and hung[body] in bodies]
+    note_names(notes, "held where they are, their masses go with what they hang on", names)
+    masses = [dataclasses.replace(each, body=hung.get(each.body, each.body)) for each in opened.collision.masses]
+    return dataclasses.replace(opened, collision=dataclasses.replace(opened.collision, masses=tuple(masses)))
 
 
 def edges_between(joints: Sequence[Joint], loops: Sequence[Loop]) -> list[Edge]:
