@@ -403,3 +403,101 @@ def test_a_poor_fit_warns_and_its_deviations_grow() -> None:
     with pytest.warns(UserWarning, match="free 'frame' or 'tool' too"):
         found = pf.calibrate(own.mechanism, pf.Measurements(readings, pose=far, sigma=0.01), free="offsets")
     assert found.deviations.min() > found.rms * 1e-3 and not found.determined.any()
+
+
+BELTS = """
+schema = 1
+name = "belts"
+units = {{ length = "mm", angle = "deg" }}
+base = "frame"
+end_effector = "pen"
+task = ["x", "y"]
+[dimensions]
+left = {left}
+top = 1900
+right = 3100
+""" + "".join(
+    f"""
+[[joint]]
+name = "{name}A"
+type = "revolute"
+connects = ["frame", "{name}T"]
+at = [{x}, {y}, 0]
+axis = [0, 0, 1]
+[[joint]]
+name = "{name}"
+type = "prismatic"
+actuated = {driven}
+connects = ["{name}T", "{name}R"]
+along = ["{name}A", "{end}"]
+[[joint]]
+name = "{end}"
+type = "revolute"
+connects = ["{name}R", "sled"]
+at = [1500, 900, 0]
+axis = [0, 0, 1]
+"""
+    for name, x, y, driven, end in (
+        ("b", '"left - {shift}"', "0", "true", "pen"),
+        ("r", '"right"', "0", "true", "rP"),
+        ("t", "0", '"top"', "false", "tP"),
+    )
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("described", [0.0, 1e-6, -1e-3, 5.0])
+def test_what_a_dimension_counts_from_does_not_matter(described: float) -> None:
+    """The same machine with its left corner counted from elsewhere: the same values and deviations, all determined."""
+    machine = loads(BELTS.format(left=described, shift=0))
+    far = loads(BELTS.format(left=described + 700.0, shift=700))
+    true = machine.with_dimensions(left=30.0, top=1815.0, right=3000.0)
+    rng = np.random.default_rng(2)
+    places = np.column_stack([rng.uniform(400, 2600, 14), rng.uniform(300, 1500, 14), np.zeros(14)])
+    solution = pf.solve_ik(true.without_limits(), places)
+    belts = solution.joints["t"] + rng.normal(0.0, 0.5, 14)
+    data = pf.Measurements(solution.actuators, joints={"t": belts}, sigma=0.5)
+    found, other = (pf.calibrate(m, data, free=["left", "top", "right"]) for m in (machine, far))
+    assert found.determined.all() and other.determined.all()
+    np.testing.assert_allclose(found.values, other.values - [700.0, 0.0, 0.0], atol=1e-5)
+    np.testing.assert_allclose(found.deviations, other.deviations, rtol=1e-6)
+    assert (np.abs(found.values - [30.0, 1815.0, 3000.0]) < 4.5 * found.deviations).all()
+
+
+FIVE_BAR = """
+schema = 1
+name = "five-bar"
+units = { length = "mm", angle = "deg" }
+base = "base"
+end_effector = "tip"
+dimensions = { rod = 120 }
+""" + "".join(
+    f"""
+[[joint]]
+name = "{name}"
+type = "revolute"
+actuated = {driven}
+connects = {bodies}
+at = {at}
+axis = [0, 0, 1]
+"""
+    for name, driven, bodies, at in (
+        ("A", "true", '["base", "left"]', "[-40, 0, 0]"),
+        ("B", "false", '["left", "left_rod"]', "[-100, 80, 0]"),
+        ("C", "true", '["base", "right"]', "[40, 0, 0]"),
+        ("D", "false", '["right", "right_rod"]', "[100, 80, 0]"),
+        ("tip", "false", '["left_rod", "right_rod"]', '[0, "80 + sqrt(rod**2 - 10000)", 0]'),
+    )
+)
+
+
+def test_readings_at_which_only_the_real_machine_can_be_assembled() -> None:
+    """Rods that are longer than described: at some readings those described do not meet."""
+    machine = loads(FIVE_BAR)
+    true = machine.with_dimensions(rod=123)
+    q = np.array([[-0.1, 0.2], [0.1, 0.1], [0.3, -0.1], [0.2, -0.2], [-0.3, 0.3], [0.29, -0.29], [0.3, -0.3]])
+    there = pf.solve_fk(true, q)
+    assert there.status.tolist() == [0] * 7 and pf.solve_fk(machine, q).status[-1] == pf.Status.PROJECTED
+    found = pf.calibrate(machine, pf.Measurements(q, position=there.pose[:, :3, 3]), free="rod")
+    assert found.values == pytest.approx([123.0], abs=1e-8)
+    with pytest.raises(InvalidArgument, match="as calibrated cannot be assembled at"):
+        pf.calibrate(machine, pf.Measurements(q, height=np.zeros(7)), free="rod")

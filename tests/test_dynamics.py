@@ -308,6 +308,28 @@ def test_more_coordinates_than_motions_share_the_rank_of_these(name: str, motion
     np.testing.assert_allclose((twist * metres) @ mass @ (twist * metres), energy)
 
 
+@pytest.mark.parametrize(("name", "task"), [("panda", ("x", "y", "z")), ("panda", None), ("serial_arm", ("x", "y"))])
+def test_of_more_motions_than_coordinates_the_mass_is_that_which_a_force_meets(
+    name: str, task: tuple[str, ...] | None
+) -> None:
+    """The least energy of all motions with a velocity there; forces M a accelerate it by a while actuators are free."""
+    machine = weighed(pf.load(name))
+    machine = machine if task is None else machine._with(task=task)
+    solution, rates, _ = somewhere(machine)
+    si, metres = units(machine)[1], metres_of(machine.length_unit)
+    of_lengths = 3 if task is None else len(task)
+    jacobian = pf.forward_jacobian(solution) / si
+    jacobian = jacobian[: of_lengths if task else len(jacobian)]
+    jacobian[:of_lengths] *= metres
+    mass, at_actuators = pf.mass_matrix(solution), pf.mass_matrix(solution, "actuators")
+    assert len(mass) < len(rates)
+    pushed = np.linalg.solve(at_actuators, jacobian.T)  # rates that a unit impulse at the task gives
+    np.testing.assert_allclose(mass @ (jacobian @ pushed), np.eye(len(mass)), atol=1e-8)
+    least = pushed @ mass @ np.arange(1.0, len(mass) + 1.0)
+    other = least + np.linalg.svd(jacobian)[2][-1]
+    assert 0.5 * least @ at_actuators @ least < 0.5 * other @ at_actuators @ other
+
+
 def test_a_mass_matrix_takes_no_forces() -> None:
     solution, *_ = somewhere(weighed(pf.load("delta")))
     with pytest.raises(pf.errors.InvalidArgument, match=r"loads\['platform'\]: found a force.*\(mass, centre\)"):

@@ -349,3 +349,13 @@ def test_a_mechanism_file_keeps_what_its_data_do_not_determine(tmp_path: Path) -
     assert text.startswith("# Not determined by the measurements, and so as described: platform_radius, apart.\n")
     assert again == pytest.approx(other.dimensions, abs=1e-6)
     assert all(again[name] == machine.dimensions[name] for name in ("platform_radius", "apart"))
+
+
+def test_what_does_not_fit_is_named_as_the_file_has_it(tmp_path: Path) -> None:
+    printer, rng = tmp_path / "printer.cfg", np.random.default_rng(6)
+    text = klipper_with_measurements(0.01, rng, NOMINAL._replace(radius=142.75))
+    for name, value in (("distance2", 64.8), ("height5", 0.6)):
+        lines = [f"#*# {name} = {value}" if line.startswith(f"#*# {name} =") else line for line in text.splitlines()]
+        printer.write_text("\n".join(lines))
+        found = pf.read_printer(printer).calibrate(free=("delta_radius", "position_endstop_a", "angle_a"))
+        assert found.outliers[0].name == name and f"{name} does not fit" in str(found)

@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import pfabrik as pf
 from machines import machine as made
 from pfabrik.capabilities.paths import path as path_module
+from pfabrik.cli import main
 from pfabrik.common.cells import marked
-from pfabrik.errors import InvalidArgument
+from pfabrik.errors import InvalidArgument, UnknownName
 
 
 def read(tmp_path: Path, text: str, name: str = "path.nc", machine: str = "stewart", **options: float) -> Any:
@@ -61,8 +63,33 @@ def test_an_arc_by_its_radius_and_a_helix(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.linalg.norm(helix[:, :2] - helix[0, :2] - [5.0, 0.0], axis=1), 5.0, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("ending", "dwell", "seconds"),
+    [
+        (".gcode", "G4 P500", 0.5), (".g", "G04 P500", 0.5), (".gcode", "G4 S2", 2.0), (".gcode", "G4 P100 S2", 2.0),
+        (".ngc", "G4 P0.5", 0.5), (".nc", "G4 P1", 1.0), (".ngc", "G1 E2\nG4 P500", 0.5), (".nc", "G4 F3", 3.0),
+        (".gcode", "G4", 0.0), (".ngc", "G4 P0", 0.0),
+    ],
+)  # fmt: skip
+def test_a_dwell_holds_the_pose_for_its_time(ending: str, dwell: str, seconds: float, tmp_path: Path) -> None:
+    moves = "G91\nG1 X10 F600\n{}\nG1 X-10\n"
+    with_dwell, without = tmp_path / f"a{ending}", tmp_path / f"b{ending}"
+    with_dwell.write_text(moves.format(f"{dwell}\n{dwell}"))
+    without.write_text(moves.format(""))
+    found, plain = (pf.read_path(file, made("stewart")) for file in (with_dwell, without))
+    assert found.times is not None and plain.times is not None
+    assert plain.times[-1] == pytest.approx(2.0)
+    assert found.times[-1] == pytest.approx(2.0 + 2.0 * seconds)
+    sampled = pf.read_path(with_dwell, made("stewart"), rate=100.0)
+    assert sampled.times is not None
+    still = (sampled.times >= 1.0) & (sampled.times <= 1.0 + 2.0 * seconds)
+    x = sampled.targets[:, 0, 3]
+    np.testing.assert_allclose(x[still], x.max(), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(x[sampled.times > 1.0 + 2.0 * seconds + 1e-9][0], x.max(), atol=0.11)
+
+
 def test_words_of_a_printers_settings_are_no_places(tmp_path: Path) -> None:
-    settings = "M205 X8 Y8 ; jerk\nN5 M204 P500 R1000\nM900 K0.2\nM117 Layer G1 X9\nM84 X Y E\nG4 F5\n"
+    settings = "M205 X8 Y8 ; jerk\nN5 M204 P500 R1000\nM900 K0.2\nM117 Layer G1 X9\nM84 X Y E\nG4 P0\n"
     found = read(tmp_path, f"M201 X500 Y500\nG1 X10 F600\n{settings}G2 X5 Y5 R5\n{settings}", longest=1000.0)
     plain = read(tmp_path, "G1 X10 F600\nG2 X5 Y5 R5\n", longest=1000.0)
     np.testing.assert_array_equal(found.targets, plain.targets)
@@ -355,3 +382,53 @@ def test_what_slicers_write_passes_and_is_named(tmp_path: Path) -> None:
         "PAUSE": 20,
         "END_PRINT": 21,
     }
+
+
+def test_a_recording_with_columns_and_units_of_its_own(tmp_path: Path) -> None:
+    """A game's log, in m and ms, is the table that it would be in the machine's units and under its names."""
+    rows = np.random.default_rng(5).uniform(-0.01, 0.01, (20, 4))
+    log, table = tmp_path / "log.csv", tmp_path / "table.csv"
+    lines = ["time;surge [m];sway;heave;roll;x;gear"]
+    plain = ["t,x,y,z,roll_rad"]
+    for k, (x, y, z, roll) in enumerate(rows):
+        lines.append(f"{20 * k};{x:.9f};{y:.9f};{z + 0.195:.9f};{roll:.9f};{k};N")
+        plain.append(f"{0.02 * k},{1000 * x:.6f},{1000 * y:.6f},{1000 * z + 195:.6f},{roll:.9f}")
+    log.write_text("\n".join(lines))
+    table.write_text("\n".join(plain))
+    machine = made("stewart")
+    columns = {"t": "time", "x": "surge [m]", "y": "sway", "z": "heave", "roll_rad": "roll"}
+    scale = {"t": 1e-3, "x": 1e3, "y": 1e3, "z": 1e3}
+    found, right = pf.read_path(log, machine, columns=columns, scale=scale), pf.read_path(table, machine)
+    np.testing.assert_allclose(found.targets, right.targets, atol=1e-5)
+    np.testing.assert_allclose(found.times, right.times, atol=1e-12)
+    assert found.others["gear"][0] == "N" and found.others["file_x"][3] == "3"
+    by_one = pf.read_path(log, machine, columns={k: v for k, v in columns.items() if k != "t"}, scale=1000.0, rate=None)
+    np.testing.assert_array_equal(by_one.targets, found.targets)
+    words = "t=time,x=surge [m],y=sway", "z=heave,roll_rad=roll"
+    options = [*(part for each in words for part in ("--columns", each)), "--scale", "1000", "--scale", "t=0.001"]
+    for command, more in (("track", []), ("time", ["--speed", "500"]), ("effort", ["--load", "platform=2,0,0,0"])):
+        files = []
+        for path, own in ((log, options), (table, [])):
+            files.append(tmp_path / f"{path.stem}.{command}")
+            line = [command, "stewart", str(path), *own, *more, "-o", str(files[-1]), "--rate", "200"]
+            result = CliRunner().invoke(main, line)
+            assert result.exit_code == 0, result.output
+        ours, theirs = ([float(row.split(",")[0]) for row in f.read_text().splitlines()[1:]] for f in files)
+        np.testing.assert_allclose(ours, theirs, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("columns", "scale", "words"),
+    [
+        ({"x": "surge"}, None, "no column 'surge'; expected one of those there: t, x, y, z"),
+        ({"x": 3}, None, r"columns\['x'\]"),
+        ({"rol": "roll"}, None, "no column named 'rol'; did you mean 'roll'"),
+        (None, {"surge": 2.0}, "no column named 'surge'"),
+        (None, -1.0, "scale"),
+        (None, {"x": 0.0}, "scale of 'x'"),
+    ],
+)
+def test_columns_that_are_not_there(columns: Any, scale: Any, words: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t,x,y,z\n0,0,0,195\n1,1,0,195\n")
+    with pytest.raises((InvalidArgument, UnknownName), match=words):
+        pf.read_path(tmp_path / "a.csv", made("stewart"), columns=columns, scale=scale)

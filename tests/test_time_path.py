@@ -457,19 +457,41 @@ def wound(machine: pf.Mechanism, turns: int, count: int, noise: float) -> pf.Tra
     return pf.track(machine, pf.solve_fk(machine, home + offsets * units).pose)
 
 
-@pytest.mark.parametrize(
-    ("name", "friction", "turns", "count", "noise", "is_kept"),
-    [
-        ("five_bar", (0.0, 0.0), 3, 80, 1e-3, True),
-        ("five_bar", (0.0, 0.0), 20, 400, 0.0, False),  # torques change more between its steps than splines do
-        ("five_bar", (0.0, 0.0), 5, 2000, 1e-5, False),  # and so do they within them, of so short ones
-        ("five_bar", (0.05, 0.01), 3, 80, 1e-4, False),  # dry friction leaps where an actuator turns back
-        ("linear_delta", (0.0, 0.0), 3, 80, 1e-3, True),
-    ],
-)
-def test_what_a_timing_exceeds_is_what_inverse_dynamics_measures_there(
-    name: str, friction: tuple[float, float], turns: int, count: int, noise: float, is_kept: bool
+WOUND = [
+    ("five_bar", (0.0, 0.0), 3, 80, 1e-3),
+    ("five_bar", (0.0, 0.0), 20, 400, 0.0),  # torques change more between its steps than splines do
+    ("five_bar", (0.0, 0.0), 5, 2000, 1e-5),  # and so do they within them, of so short ones
+    ("five_bar", (0.05, 0.01), 3, 80, 1e-4),  # dry friction leaps where an actuator turns back
+    ("linear_delta", (0.0, 0.0), 3, 80, 1e-3),
+    ("stewart", (0.5, 0.0), 40, 3000, 0.0),  # a path of minutes
+]
+
+
+@pytest.mark.parametrize(("name", "friction", "turns", "count", "noise"), [*WOUND[1:4], WOUND[5]])
+def test_torques_are_kept_between_the_points_of_a_path(
+    name: str, friction: tuple[float, float], turns: int, count: int, noise: float
 ) -> None:
+    """To a thousandth, in samples that are denser than its grid was at first."""
+    track = wound(heavy(name, friction), turns, count, noise)
+    rest = np.zeros(3 if name == "five_bar" else 6)
+    most = 1.5 * np.abs(pf.inverse_dynamics(track, twists=rest).actuators).max()
+    timed = pf.time_path(track, torque=most)
+    assert timed.exceeded == () and timed.used.max() <= 1.001
+    assert measured(track, most, 50_000.0 / timed.duration).max() <= 1.001
+
+
+@pytest.mark.parametrize(("name", "friction", "turns", "count", "noise"), WOUND[:5])
+def test_what_a_timing_exceeds_is_what_inverse_dynamics_measures_there(
+    name: str,
+    friction: tuple[float, float],
+    turns: int,
+    count: int,
+    noise: float,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where the grid stays as it is at first."""
+    monkeypatch.setattr("pfabrik.capabilities.timing.time_path.REFINEMENTS", 0)
+    is_kept = noise == 1e-3 or friction[0] > 0.0  # friction counts at either sign
     track = wound(heavy(name, friction), turns, count, noise)
     machine, rest = track.mechanism, np.zeros(3 if name == "five_bar" else 6)
     most = 1.5 * np.abs(pf.inverse_dynamics(track, twists=rest).actuators).max()
@@ -495,7 +517,8 @@ def measured(track: pf.Track, most: float, rate: float) -> Floats:
     return np.abs(np.where(efforts.at_rest.any(axis=1, keepdims=True), 0.0, efforts.actuators)) / most
 
 
-def test_the_command_says_what_is_exceeded(tmp_path: Path) -> None:
+def test_the_command_says_what_is_exceeded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pfabrik.capabilities.timing.time_path.REFINEMENTS", 0)
     machine = heavy("five_bar")
     pf.save(machine, tmp_path / "m.toml")
     track = wound(machine, 20, 400, 0.0)
@@ -509,3 +532,28 @@ def test_the_command_says_what_is_exceeded(tmp_path: Path) -> None:
         f"{each.actuator} exceeds its limit of torque by {each.share - 1.0:.2%}" for each in exceeded
     ]
     assert json.loads(pfabrik(f"{line} --json").stdout)["exceeded"][0]["step"] == exceeded[0].step
+
+
+@pytest.mark.parametrize("acceleration", [None, 3.0])
+def test_a_dwell_stops_the_path_for_its_time(acceleration: float | None, tmp_path: Path) -> None:
+    """Each part takes what it takes alone, and nothing moves between them."""
+    machine = pf.load("delta")
+    parts = ["G1 X20 Y0 Z-200 F6000\nG1 X40\n", "G1 X0 Y30\n"]
+    (tmp_path / "whole.gcode").write_text(f"G4 S0.25\n{parts[0]}G4 P500\nG4 P100\n{parts[1]}G4 S1\n")
+    read = pf.read_path(tmp_path / "whole.gcode", machine)
+    track = pf.track(machine, read.targets)
+    limits = {"speed": 3.0, "rate": 200.0} | ({} if acceleration is None else {"acceleration": acceleration})
+    timed = pf.time_path(track, dwells=read.dwells, **limits)
+    stop = int(np.flatnonzero(read.dwells)[1])
+    alone = [pf.time_path(pf.track(machine, each), **limits) for each in (read.targets[:stop], read.targets[stop:])]
+    first, second = (each.duration for each in alone)
+    assert timed.duration == pytest.approx(0.25 + first + 0.6 + second + 1.0, abs=1e-9)
+    assert (np.diff(timed.times) > 0.0).all() and np.diff(timed.times).max() < 1.001 / 200.0
+    for begin, end in ((0.0, 0.25), (0.25 + first, 0.85 + first), (0.85 + first + second, timed.duration)):
+        rows = (timed.times > begin + 1e-9) & (timed.times < end - 1e-9)
+        assert rows.sum() > 40 and not timed.rates[rows].any() and not timed.accelerations[rows].any()
+        assert np.ptp(timed.actuators[rows], axis=0).max() == 0.0
+    none = pf.time_path(track, dwells=0.0 * read.dwells, **limits)
+    assert none.duration == pf.time_path(track, **limits).duration
+    with pytest.raises(InvalidArgument, match="dwells"):
+        pf.time_path(track, dwells=-read.dwells, **limits)

@@ -136,6 +136,11 @@ print(printer.corrected(thirty).dimensions["arm_length_a"])
 # the file, and what was measured there: `height`, or `x`, `y`, `z`. A comment at the top of what is written names the
 # parameters that stay as described.
 #
+# Without carriages, `x`, `y` and `height` are what was commanded and the true height there. A log with lines such as
+# "probe at 30,40 is z=0.12" (`pfabrik calibrate printer.cfg klippy.log`) and RepRapFirmware's `heightmap.csv` do as
+# well: carriages are then where the settings of the file have them. Several files count together, as
+# `Measurements + Measurements` in Python. `pfabrik calibrate config.g --list` lists what may be freed.
+#
 # An endstop is given as Klipper gives it, for the nozzle in the middle: `position_endstop_a` also changes with the
 # radius. `--free NAME` frees what you name, and nothing else; then deviations take all the rest to be exact.
 

@@ -8,7 +8,7 @@
 
 Describe   load, save, catalog; Mechanism, Joint, Cone, Leg, Shape, Mass
 Ask        solve_ik, solve_fk, track, configuration, travel; assembly_modes, working_modes; pose, Options
-           Solver (one machine, asked again and again), Live (one that follows any stream)
+           Solver (one machine, asked again and again), Live (one that follows any stream); sweep (millions, into files)
 Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residual
 Look over   workspace, singularity_map
 Prove      certify, largest; PoseRegion, Certificate

@@ -33,13 +33,13 @@ from .answers.tracked import Track as Track
 from .capabilities.actuation.actuation import Actuation as Actuation
 from .capabilities.actuation.actuation import actuation as actuation
 from .capabilities.calibration.calibration import Calibration as Calibration
-from .capabilities.calibration.csv_measurements import read_measurements as read_measurements
 from .capabilities.calibration.least_squares import calibrate as calibrate
 from .capabilities.calibration.measurements import Measurements as Measurements
 from .capabilities.calibration.parameters import Parameters as Parameters
 from .capabilities.calibration.parameters import parameters as parameters
 from .capabilities.calibration.plot_calibration import plot_calibration as plot_calibration
 from .capabilities.calibration.printer_settings import read_printer as read_printer
+from .capabilities.calibration.read_measurements import read_measurements as read_measurements
 from .capabilities.calibration.sensitivity import Sensitivity as Sensitivity
 from .capabilities.calibration.sensitivity import sensitivity as sensitivity
 from .capabilities.certify.certificates import Certificate as Certificate
@@ -145,6 +145,7 @@ from .options import Options as Options
 from .search_log import SearchLog as SearchLog
 from .search_log import search_log as search_log
 from .solver import Solver as Solver
+from .sweep import sweep as sweep
 from .track import track as track
 from .travel import Travel as Travel
 from .travel import travel as travel

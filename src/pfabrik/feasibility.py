@@ -13,8 +13,10 @@ from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .answers.words import bound_notes
 from .common.arrays import Floats, Ints, shaped
-from .common.executors import Workers, slices
+from .common.checks import require_callable
+from .common.executors import Workers, slices, told
 from .common.printed import ResultTable, plain
+from .common.telling import OnProgress
 from .engines.engine import engine_of, legs_decide
 from .engines.joints.configurations import Configurations
 from .engines.joints.link_distances import least_distances, pair_names
@@ -81,7 +83,12 @@ class Feasibility(NamedTuple):
 
 
 def feasibility(
-    mechanism: Mechanism, targets: Target, *, start: Start | None = None, executor: Executor | None = None
+    mechanism: Mechanism,
+    targets: Target,
+    *,
+    start: Start | None = None,
+    executor: Executor | None = None,
+    on_progress: OnProgress | None = None,
 ) -> Feasibility:
     """Margins of targets in one working mode, by the legs' closed forms.
 
@@ -102,6 +109,8 @@ def feasibility(
     executor : Executor, optional
         Of `concurrent.futures`, or one like it, on whose workers blocks of targets are measured; default: here, on all
         cores.
+    on_progress : callable, optional
+        Called with the targets that are measured and their number, as in `solve_ik`.
 
     Raises
     ------
@@ -115,12 +124,15 @@ def feasibility(
     if model.why_poses_do_not_suffice:
         raise UnsupportedMechanism(mechanism.name, [model.why_poses_do_not_suffice])
     poses, shape = as_targets(mechanism, targets)
-    if executor is None:
+    require_callable("on_progress", on_progress)
+    if executor is None and on_progress is None:
         margin, binding = _best_of_modes(mechanism, poses, configuration)
     else:
-        blocks = [(poses[block], configuration) for block in slices(len(poses))]
+        parts = slices(len(poses))
+        blocks = [(poses[block], configuration) for block in parts]
         with closing(Workers(executor, mechanism).results(_best_of_modes, blocks)) as results:
-            margin, binding = (np.concatenate(parts) for parts in zip(*results, strict=True))
+            each = list(told(results, parts, len(poses), on_progress))
+        margin, binding = (np.concatenate(values) for values in zip(*each, strict=True))
     return Feasibility(shaped(margin, shape), shaped(binding, shape), limits_of(mechanism))
 
 

@@ -12,7 +12,9 @@ from .answers.answer_fields import Before, PoseRequest
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .common.arrays import Floats
-from .common.executors import SLOWER, Workers, slices
+from .common.checks import require_callable
+from .common.executors import SLOWER, Workers, slices, told
+from .common.telling import OnProgress
 from .engines.engine import engine_of, knows_all_modes
 from .engines.joints.close import measure_configurations
 from .engines.joints.closure_engine import ClosureEngine
@@ -37,6 +39,7 @@ def solve_ik(
     start: Start | None = None,
     options: Options | None = None,
     executor: Executor | None = None,
+    on_progress: OnProgress | None = None,
 ) -> Solution:
     """Actuator values that put the end effector on a target, or as near as possible, with every limit kept.
 
@@ -56,6 +59,8 @@ def solve_ik(
     executor : Executor, optional
         Of `concurrent.futures`, or one like it, on whose workers blocks of a batch are answered, with the same answers;
         default: here, on all cores.
+    on_progress : callable, optional
+        Called with the rows that are answered and their number, block by block.
 
     Returns
     -------
@@ -67,7 +72,7 @@ def solve_ik(
     InvalidArgument
         A target or start of the wrong shape, or (unless marked) rows that are no poses.
     """
-    return solve_by(engine_of, mechanism, target, start, checked_options(options), executor)
+    return solve_by(engine_of, mechanism, target, start, checked_options(options), executor, on_progress)
 
 
 def solve_by(
@@ -77,14 +82,17 @@ def solve_by(
     start: Start | None,
     options: Options,
     executor: Executor | None = None,
+    on_progress: OnProgress | None = None,
 ) -> Solution:
     """As `solve_ik`, by the engine that is chosen."""
     targets, shape = as_targets(mechanism, target)
     begin, before = start_of(mechanism, start, shape), start._request if isinstance(start, Solution) else None
-    if executor is None:
+    require_callable("on_progress", on_progress)
+    if executor is None and on_progress is None:
         solutions = _answers(mechanism, targets, begin, before, options, choose_engine)
     else:
-        solutions = _answers_elsewhere(executor, mechanism, targets, begin, before, options, choose_engine)
+        asked = mechanism, targets, begin, before, options, choose_engine
+        solutions = _answers_by_blocks(executor, on_progress, *asked)
     status = solutions.rows.status
     refuse_invalid(targets, shape, status, options)
     is_missed = status[0] != REACHED if len(status) == 1 else (status != REACHED).any()
@@ -97,8 +105,9 @@ def solve_by(
     return Solution(mechanism, solutions, shape, request if is_missed else None, None, known)
 
 
-def _answers_elsewhere(
-    executor: Executor,
+def _answers_by_blocks(
+    executor: Executor | None,
+    tell: OnProgress | None,
     mechanism: Mechanism,
     targets: Floats,
     begin: Configurations | None,
@@ -106,16 +115,17 @@ def _answers_elsewhere(
     options: Options,
     choose_engine: Callable[[Mechanism], InverseEngine],
 ) -> Configurations:
-    """As `_answers`, in blocks on the workers of an executor."""
+    """As `_answers`, in blocks, on the workers of an executor or here, with progress told behind each."""
     blocks = []
-    for block in slices(len(targets), 1 if choose_engine(mechanism).bounds_steps else SLOWER):
+    parts = slices(len(targets), 1 if choose_engine(mechanism).bounds_steps else SLOWER)
+    for block in parts:
         rows = np.arange(len(targets))[block]
         is_each = begin is not None and len(begin) > 1
         begin_there = begin.at(rows) if begin is not None and is_each else begin
         before_there = PoseRequest(before.targets[rows], before.options) if before is not None and is_each else before
         blocks.append((targets[block], begin_there, before_there, options, choose_engine))
     with closing(Workers(executor, mechanism).results(_answers, blocks)) as results:
-        first, *others = results
+        first, *others = told(results, parts, len(targets), tell)
     return first.followed_by(others)
 
 

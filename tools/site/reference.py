@@ -48,7 +48,7 @@ PAGES = {
         "Solving",
         "`solve_ik` goes from poses to actuators and `solve_fk` back; both return a `Solution` that says what was "
         "reached. The other names follow a path, repeat calls without allocation, or list all solutions.",
-        "pose solve_ik solve_fk track Options Solver Live configuration feasibility Feasibility working_modes "
+        "pose solve_ik solve_fk track sweep Options Solver Live configuration feasibility Feasibility working_modes "
         "WorkingModes assembly_modes AssemblyModes search_log SearchLog",
         "engines.joints.attempts.Attempt",
     ),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Sequence
+from functools import partial, reduce
+from operator import add
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -24,16 +26,20 @@ from .outputs import (
 )
 from .printing import json_option, note, print_result
 
+if TYPE_CHECKING:
+    from ..capabilities.calibration.free_names import FreeNames
+
 
 @click.command()
 @click.argument("mech", type=MECH)
-@click.argument("data", required=False, type=click.Path(path_type=Path))
+@click.argument("data", nargs=-1, type=click.Path(path_type=Path))
 @click.option(
     "--free",
     multiple=True,
     metavar="NAME",
     help="What may vary: dimensions, points, axes, lengths, offsets, frame, tool, scale, or a name. May be repeated.",
 )
+@click.option("--list", "is_list", is_flag=True, help="List what may be freed, by kind, with the described values.")
 @click.option("--tied", is_flag=True, help="Correct all copies of a joint alike: fewer unknowns.")
 @click.option("--sigma", type=float, help="Standard deviation of a measurement [length or rad]. Default: estimated.")
 @click.option("-o", "--output", help="Mechanism file to write, with the calibrated values.", **OUTPUT)
@@ -45,8 +51,9 @@ from .printing import json_option, note, print_result
 @json_option()
 def calibrate(
     mech: str,
-    data: Path | None,
+    data: tuple[Path, ...],
     free: tuple[str, ...],
+    is_list: bool,
     tied: bool,
     sigma: float | None,
     output: Path | None,
@@ -58,13 +65,19 @@ def calibrate(
     """Find the parameters of a machine from measurements.
 
     DATA is a CSV file with a column for each actuator and for what was measured: x, y, z, roll, pitch, yaw, height,
-    distance and distance_to, other joints. Without DATA, MECH is Klipper's printer.cfg: what it has measured is in it.
+    distance and distance_to, other joints. In place of actuators it may have what was commanded: x, y and height. Or it
+    is what a probe wrote: lines of a log such as "probe at 30,40 is z=0.12", or RepRapFirmware's heightmap.csv. Several
+    files count together. Without DATA, MECH is Klipper's printer.cfg: what it has measured is in it.
+
     Of a printer's settings, actuators are what the firmware counts with them, and endstops, radius, angles and arms may
     vary. What the measurements do not determine stays as described, also in the files that are written.
     """
+    if is_list:
+        print_result(as_json, _free_names(mech))
+        return 0
     written = {form: path for form, path in settings.items() if path is not None}
     outputs = [("-o", output), ("--plot", plot), *((f"--{form}", path) for form, path in written.items())]
-    check_outputs(outputs, [Path(mech), *([data] if data else [])], as_json=as_json)
+    check_outputs(outputs, [Path(mech), *data], as_json=as_json)
     refuse_both_on_stdout(output, as_json)
     require_picture(plot)
     for path in (output, *written.values()):
@@ -92,30 +105,46 @@ def calibrate(
 
 
 def _calibrated(
-    mech: str, data: Path | None, free: tuple[str, ...] | None, ties: Literal["copies"] | None, sigma: float | None
+    mech: str, data: tuple[Path, ...], free: tuple[str, ...] | None, ties: Literal["copies"] | None, sigma: float | None
 ) -> tuple[pf.Calibration, pf.Mechanism]:
     """The calibration, and the machine to write."""
     from ..machine.files import printer_settings_of
 
     if printer_settings_of(mech) is not None:
         printer = pf.read_printer(mech, sigma=sigma)
-        measured = printer.measurements if data is None else _read(data, printer.mechanism, sigma)
+        measured = _read(data, printer.mechanism, sigma, printer.probe_offset) if data else printer.measurements
         if measured is not None:
             result = printer.calibrate(measured, free, ties=ties)
             return result, printer.corrected(result)
         if mech.endswith(".cfg"):
             raise click.ClickException(f"{mech}: no measurements; run DELTA_CALIBRATE and SAVE_CONFIG first")
     mechanism = load(mech)
-    if data is None:
+    if not data:
         raise click.UsageError("Missing argument 'DATA': a CSV file of measurements")
     result = pf.calibrate(mechanism, _read(data, mechanism, sigma), free=free, ties=ties)
     return result, result.mechanism
 
 
-def _read(data: Path, mechanism: pf.Mechanism, sigma: float | None) -> pf.Measurements:
-    if not data.exists():
-        raise click.ClickException(f"{data}: no such file")
-    return pf.read_measurements(data, mechanism, sigma=sigma)
+def _read(
+    files: tuple[Path, ...], mechanism: pf.Mechanism, sigma: float | None, probe: Sequence[float] = (0.0, 0.0, 0.0)
+) -> pf.Measurements:
+    """What all files have, as one."""
+    missing = next((file for file in files if not file.exists()), None)
+    if missing is not None:
+        raise click.ClickException(f"{missing}: no such file")
+    parts = [pf.read_measurements(file, mechanism, sigma=sigma, probe_offset=probe) for file in files]
+    return reduce(add, parts)
+
+
+def _free_names(mech: str) -> FreeNames:
+    """What may be freed of a machine, or of a printer as its firmware counts it."""
+    from ..capabilities.calibration.free_names import free_names
+    from ..machine.files import printer_settings_of
+
+    if printer_settings_of(mech) is None:
+        return free_names([load(mech)])
+    printer = pf.read_printer(mech)
+    return free_names([printer.mechanism, printer.described])
 
 
 def _said_of(held: list[str], mark: str) -> str:

@@ -14,11 +14,11 @@ from .arguments import FINITE, MECH, Triple, load
 from .outputs import OUTPUT, STANDARD, check_outputs, refuse_both_on_stdout, require_picture, whole_file, write_picture
 from .printing import json_option, print_result
 from .statics import Loads, carrying, weighed
-from .track import at_lines_of, limiting
+from .track import at_lines_of, limiting, recorded
 
 if TYPE_CHECKING:
     from ..capabilities.paths import path as paths
-    from .track import LimitsOf
+    from .track import LimitsOf, Reading
 
 
 @click.command()
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 @click.option("--sample-time", type=FINITE, metavar="S", help="Time from one target to the next [s].")
 @click.option("--rapid", type=FINITE, metavar="V", help="Feed of rapid moves (G0), which say none [length/s].")
 @click.option("--rate", type=FINITE, metavar="HZ", help="Resample the path: targets per second.")
+@recorded
 @limiting
 @carrying
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Picture too: PNG, SVG or PDF.")
@@ -41,6 +42,7 @@ def effort(
     gravity: Triple,
     plot: Path | None,
     as_json: bool,
+    reading: Reading,
     sample_time: float | None,
     rapid: float | None,
     rate: float | None,
@@ -61,12 +63,12 @@ def effort(
     mechanism = weighed(mechanism, loads)
     if limits and sample_time is not None:
         raise click.UsageError("--sample-time does not go with limits, which time the path")
-    read = pf.read_path(path, mechanism, rapid=rapid, rate=None if limits else rate)
+    read = pf.read_path(path, mechanism, rapid=rapid, rate=None if limits else rate, **reading)
     with nullcontext() if output is None else whole_file(output) as handle, at_lines_of(read):
         if limits:
             track = pf.track(mechanism, read.targets)
             motion: pf.Timed | pf.Track = pf.time_path(
-                track, **limits, loads=loads, gravity=gravity, rate=rate or 1000.0
+                track, **limits, loads=loads, gravity=gravity, rate=rate or 1000.0, dwells=read.dwells
             )
         else:
             motion = at_its_times(mechanism, read, sample_time)

@@ -46,6 +46,39 @@ MOST_TARGETS = 1_000_000_000
 """Targets of a path that is followed part by part, at most: what is longer has no end."""
 
 
+Reading: TypeAlias = "dict[str, Any]"
+
+
+def _reading(columns: tuple[str, ...], scales: tuple[str, ...]) -> Reading:
+    named: dict[str, str] = {}
+    for part in (each for text in columns for each in text.split(",")):
+        name, is_given, column = part.partition("=")
+        if not (is_given and name.strip() and column.strip()):
+            raise click.UsageError(f"--columns: found '{part}'; expected NAME=COLUMN, as in t=time,x=surge")
+        named[name.strip()] = column.strip()
+    from ..capabilities.paths.csv_table import LENGTHS, NUMERIC
+
+    factors = by_name("--scale", scales, "column", NUMERIC, positive, LENGTHS)
+    return {"columns": named, "scale": factors}
+
+
+recorded = together(
+    "reading",
+    _reading,
+    click.option(
+        "--columns", multiple=True, metavar="NAME=COLUMN,...", help="What the file calls its columns: t=time,x=surge."
+    ),
+    click.option(
+        "--scale",
+        "scales",
+        multiple=True,
+        metavar="[NAME=]FACTOR",
+        help="Factor on its lengths, 1000 from m to mm, or on a column: t=0.001.",
+    ),
+)
+"""Adds what recordings call their columns; a command gets `reading`, for `read_path`."""
+
+
 @click.command()
 @click.argument("mech", type=MECH)
 @click.argument("path", type=click.Path(path_type=Path, allow_dash=True))
@@ -56,6 +89,7 @@ MOST_TARGETS = 1_000_000_000
 @click.option("--rate", type=FINITE, metavar="HZ", help="Resample the path: targets per second.")
 @click.option("--longest", type=FINITE, metavar="D", help="Resample the path: longest step [length].")
 @click.option("--tolerance", type=FINITE, metavar="D", help="How far steps may be off an arc [length].")
+@recorded
 @speed_option
 @click.option("--live", "is_live", is_flag=True, help="Follow it as a stream: drives keep --speed, nothing leaps.")
 @click.option(
@@ -71,6 +105,7 @@ def track(
     options: pf.Options,
     speeds: tuple[str, ...],
     is_live: bool,
+    reading: Reading,
     picture_path: Path | None,
     film_path: Path | None,
     drawn: PictureOptions,
@@ -110,7 +145,8 @@ def track(
     from ..capabilities.paths.read_path import path_blocks
 
     is_whole = as_json or is_drawn
-    read = partial(path_blocks, path, mechanism, most=None if is_whole else MOST_TARGETS, **sampling)
+    most = None if is_whole else MOST_TARGETS
+    read: Any = partial(path_blocks, path, mechanism, most=most, **{**sampling, **reading})
     check = partial(checked, mechanism=mechanism, is_timed=bool(limits))
     blocks, n_targets = blocks_of(path if output is not None else STANDARD, read, check, whole=is_whole)
     summary = TrackSummary(mechanism)
@@ -290,6 +326,7 @@ def at_lines_of(path: paths.Path) -> Iterator[None]:
 @click.argument("mech", type=MECH)
 @click.argument("path", type=click.Path(path_type=Path, allow_dash=True))
 @click.option("-o", "--output", help="CSV file to write; - prints it.", **OUTPUT)
+@recorded
 @limiting
 @carrying
 @click.option("--rate", type=FINITE, default=1000.0, show_default=True, metavar="HZ", help="Samples per second.")
@@ -302,6 +339,7 @@ def time(
     loads: Loads,
     gravity: Triple,
     rate: float,
+    reading: Reading,
     as_json: bool,
 ) -> int:
     """Find the fastest way along a path.
@@ -322,9 +360,10 @@ def time(
         mechanism = weighed(mechanism, loads)
     elif any(joint.max_torque for joint in mechanism.joints) and (left := lacking_masses(mechanism)):
         note(f"max_torque of the file has no effect: no `mass` of {', '.join(left)} in tables [[body]]")
-    read = pf.read_path(path, mechanism)
+    read = pf.read_path(path, mechanism, **reading)
     with nullcontext() if output is None else whole_file(output) as handle, at_lines_of(read):
-        timed = pf.time_path(pf.track(mechanism, read.targets), **limits, loads=loads, gravity=gravity, rate=rate)
+        followed = pf.track(mechanism, read.targets)
+        timed = pf.time_path(followed, **limits, loads=loads, gravity=gravity, rate=rate, dwells=read.dwells)
         if handle is not None:
             timed.write(handle)
     print_result(as_json, timed, to_stderr=output == STANDARD)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Executor, Future
 from functools import lru_cache
 from typing import Any, TypeVar
@@ -32,6 +32,16 @@ def slices(n: int, cost: int = 1) -> list[slice]:
     """
     rows = max(1, POSES_A_BLOCK // cost)
     return [slice(first, first + rows) for first in range(0, max(n, 1), rows)]
+
+
+def told(
+    results: Iterable[Result], blocks: Iterable[slice], n: int, tell: Callable[[int, int], None] | None
+) -> Iterator[Result]:
+    """Results of blocks of n rows, with the rows that are done told behind each."""
+    for result, block in zip(results, blocks, strict=True):
+        if tell is not None and n:
+            tell(min(block.stop, n), n)
+        yield result
 
 
 class Workers:

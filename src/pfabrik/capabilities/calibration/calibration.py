@@ -60,12 +60,15 @@ class Suspect(NamedTuple):
     quantity : {"row", "distance"}
         Kind of the measurement.
     residual : float
-        Largest difference of the row, in standard deviations, from what the others predict.
+        Difference of the row from what the others predict, in standard deviations (root mean square of its numbers).
+    name : str
+        What its file calls it.
     """
 
     row: int
     quantity: str
     residual: float
+    name: str
 
 
 def table_of(mechanism: Mechanism, parameters: Sequence[ParameterValue], facts: Sequence[str]) -> ResultTable:
@@ -105,15 +108,14 @@ OPEN = 1e-5
 WEAK = 3e-3
 """Deviation, in a parameter's scale, above which it counts as undetermined whatever the rank: 3 mm of a rod of 1 m."""
 
-LEAST_NOISE = 1e-5
-"""Error that measurements of unknown quality are taken to have at least [L], to say what they determine: 10 um of 1 m.
-Simulated ones have none, and would seem to determine what no instrument shows."""
-
 LIKELY = 0.75
 """Probability with which noise is no larger than it is taken to be, where few values are left over to tell it by."""
 
-MOST_SUSPECTS, SUSPICIOUS = 3, 4.0
-"""Measurements that are named as not fitting: the most, and from how many standard deviations."""
+MOST_OUTLIERS = 3
+"""Measurements that are named as not fitting, at most."""
+
+TOO_FAR = 4.0
+"""Root mean square, in standard deviations, from which values do not explain the measurements."""
 
 AS_DESCRIBED = f"what is not determined stays as described; deviations of the others take it to be right to {WEAK:.1%}"
 """Treatments of parameters that are not determined."""
@@ -179,7 +181,7 @@ class Calibration(Printed):
 
     @cached_property
     def rms_left_out(self) -> float:
-        _, raw, _ = self._data.left_out()
+        raw = self._data.left_out().raw
         return float(np.sqrt(np.nanmean(raw**2))) if np.isfinite(raw).any() else float("nan")
 
     @cached_property
@@ -234,7 +236,7 @@ class Calibration(Printed):
         if self._whole is not self:
             return self._whole.doubt
         known, length = self.measurements.has_deviations, self._parameters.mechanism.characteristic_length
-        if not self.rms > (SUSPICIOUS if known else np.inf if self.measurements.sigma else WEAK * length):
+        if not self.rms > (TOO_FAR if known else np.inf if self.measurements.sigma else WEAK * length):
             return ""
         off = f"{self.rms:.3g} {'standard deviations' if known else self._parameters.mechanism.length_unit}".strip()
         held = [
@@ -254,8 +256,7 @@ class Calibration(Printed):
             return self._data.variance
         spare = self._data.spare
         most = float(self._data.variance * spare / chdtri(spare, LIKELY)) if spare else 0.0
-        length = self._parameters.mechanism.characteristic_length
-        return most if self.measurements.sigma else max(most, (LEAST_NOISE * length) ** 2)
+        return most if self.measurements.sigma else max(most, self._data.least_noise**2)
 
     @property
     def parameters(self) -> tuple[ParameterValue, ...]:
@@ -290,13 +291,19 @@ class Calibration(Printed):
     @cached_property
     def worst_rows(self) -> tuple[Suspect, ...]:
         """Measurements from the worst: how far each is from what the others predict, in standard deviations."""
-        numbers, _, student = self._data.left_out()
-        rows = self.measurements.rows
+        numbers, _, student, _ = self._data.left_out()
         order = [k for k in np.argsort(-np.nan_to_num(student, nan=-1.0)) if np.isfinite(student[k])]
-        return tuple(
-            Suspect(int(n), "row", float(s)) if n < rows else Suspect(int(n) - rows, "distance", float(s))
-            for n, s in ((numbers[k], student[k]) for k in order)
-        )
+        return tuple(self._suspect(int(numbers[k]), float(student[k])) for k in order)
+
+    @cached_property
+    def outliers(self) -> tuple[Suspect, ...]:
+        """Measurements that do not fit the others, three at most: noise alone names some in one of a hundred fits."""
+        return tuple(self._suspect(number, residual) for number, residual in self._data.outliers(MOST_OUTLIERS))
+
+    def _suspect(self, number: int, residual: float) -> Suspect:
+        name, rows = self.measurements.names[number], self.measurements.rows
+        is_row = number < rows
+        return Suspect(number if is_row else number - rows, "row" if is_row else "distance", residual, name)
 
     @property
     def sizes(self) -> tuple[Floats, Floats]:
@@ -344,7 +351,7 @@ class Calibration(Printed):
             "rank": self.rank,
             "doubt": self.doubt,
             "undetermined": list(self.undetermined),
-            "worst_rows": [each._asdict() for each in self.worst_rows[:MOST_SUSPECTS]],
+            "outliers": [each._asdict() for each in self.outliers],
         }
 
     def _size(self, rms: float) -> str:
@@ -363,16 +370,12 @@ class Calibration(Printed):
     def _facts(self) -> list[str]:
         """What is left, what is open, and what does not fit, a sentence each."""
         left_out = f", {self._size(self.rms_left_out)} where the others predict" if self.rms_left_out > 0.0 else ""
-        suspects = [each for each in self.worst_rows[:MOST_SUSPECTS] if each.residual > SUSPICIOUS]
         return [
             f"rms {self._size(self.rms_before)} before, {self._size(self.rms)} after{left_out} [{self.residual_unit}]",
             *([self.doubt] if self.doubt else []),
             *self.undetermined,
             *([] if self.determined.all() else [AS_DESCRIBED]),
-            *(
-                f"{each.quantity} {each.row + 1} does not fit: off by {each.residual:.1f} standard deviations"
-                for each in suspects
-            ),
+            *(f"{each.name} does not fit: off by {each.residual:.1f} standard deviations" for each in self.outliers),
         ]
 
 

@@ -17,7 +17,7 @@ from ...common.extras import require
 from ...errors import InvalidArgument
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from .calibration import Calibration
-from .linear_fit import RANK, LinearFit, decomposed
+from .linear_fit import LEAST_NOISE, RANK, LinearFit, decomposed
 from .measured_residuals import Fit, Residuals, residuals, slopes_of, whitened
 from .measurements import Measurements
 from .parameters import Free, Parameters, parameters
@@ -116,6 +116,7 @@ def largest_determined(
     else:
         problem.free = found.kept
         found = problem.fitted(found)
+    fit.require_assembled(found.values)
     if found.doubt:
         warnings.warn(f"'{own.mechanism.name}': {found.doubt}", stacklevel=3)
     return found
@@ -184,15 +185,16 @@ class _Problem:
         blocks = self._blocks(values, slopes=True)
         every = self.factors[:, None] * slopes_of(blocks) * self.own.scales
         groups = np.concatenate([block.groups for block in blocks])
-        has_sigma = self.fit.measurements.has_deviations
+        kinds = np.repeat(np.arange(len(blocks)), [len(block.groups) for block in blocks])
+        has_sigma, least = self.fit.measurements.has_deviations, LEAST_NOISE * self.fit.length
         residual = self.factors * residuals(blocks)
-        data = LinearFit(every * self.free, residual, groups, has_sigma)
+        data = LinearFit(every * self.free, residual, groups, kinds, has_sigma, least)
         fitted = data
         if self.priors:
             every = np.concatenate([every, self._prior_slopes()])
             left = np.concatenate([residual, (values[self.places] - self.prior_values) / self.prior_sigmas])
-            numbers = np.concatenate([groups, np.full(len(self.places), -1)])
-            fitted = LinearFit(every * self.free, left, numbers, has_sigma)
+            groups, kinds = (np.concatenate([each, np.full(len(self.places), -1)]) for each in (groups, kinds))
+            fitted = LinearFit(every * self.free, left, groups, kinds, has_sigma, least)
         before = self.factors * residuals(self.before)
         by_quantity = {block.quantity: block.residual for block in blocks}
         given = self.own, self.fit.measurements, values, self.priors
@@ -226,14 +228,7 @@ MOST_RANKS, MOST_STEPS = 3, 60
 
 def _check_sigma(measurements: Measurements) -> None:
     given = measurements.sigma
-    measured = {
-        "position": measurements.position,
-        "orientation": measurements.orientation,
-        "height": measurements.height,
-        "distances": measurements.distances if len(measurements.distances) else None,
-        "joints": measurements.joints or None,
-    }
-    missing = [name for name, values in measured.items() if values is not None and name not in given]
+    missing = [name for name in measurements.quantities if name not in given]
     if given and missing:
         raise InvalidArgument("sigma", f"none for {', '.join(missing)}", "one for every quantity that is measured")
 

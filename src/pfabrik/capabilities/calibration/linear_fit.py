@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +16,28 @@ RANK = 1e-8
 derivatives are exact to 1e-10, and what decides, at 1e-5 and above, is far from it."""
 
 
+FALSE, LEAST_OTHERS = 0.01, 2
+"""How often noise alone may name a measurement that does not fit; and how many numbers are to be left over without it:
+of one, all measurements are as far off as each other."""
+
+
+class LeftOut(NamedTuple):
+    """Measurements beside what the others predict of them.
+
+    Attributes
+    ----------
+    numbers : of the measurements, (k,).
+    raw : root mean square residual of each, (k,).
+    student : the same in standard deviations, (k,); as the others show them where none are given.
+    chances : how often noise would put this one so far off, (k,); NaN where too little is left over to tell.
+    """
+
+    numbers: Ints
+    raw: Floats
+    student: Floats
+    chances: Floats
+
+
 @dataclass(frozen=True)
 class LinearFit:
     """A least-squares problem at its solution.
@@ -22,14 +46,17 @@ class LinearFit:
     ----------
     jacobian : of the residuals in standard deviations by parameters in their scales, (m, p).
     residual : (m,), in standard deviations, or as lengths where none are given.
-    groups : the measurement of every residual, (m,).
+    groups, kinds : the measurement of every residual, and what kind of quantity it is of, (m,).
     has_sigma : True if standard deviations are given.
+    least_noise : deviation of a residual at least, where none are given: simulated ones are off by rounding.
     """
 
     jacobian: Floats
     residual: Floats
     groups: Ints
+    kinds: Ints
     has_sigma: bool
+    least_noise: float
 
     @cached_property
     def _decomposed(self) -> tuple[Floats, Floats, Floats]:
@@ -59,7 +86,12 @@ class LinearFit:
     @cached_property
     def spare(self) -> int:
         """Number of residuals beyond what is determined by them; what has no weight does not count."""
-        return int((self.jacobian.any(axis=1) | (self.residual != 0.0)).sum()) - self.rank
+        return int(self._counted.sum()) - self.rank
+
+    @cached_property
+    def _counted(self) -> Mask:
+        """Residuals that have a weight, (m,)."""
+        return np.asarray(self.jacobian.any(axis=1) | (self.residual != 0.0))
 
     @cached_property
     def cofactors(self) -> Floats:
@@ -108,28 +140,79 @@ class LinearFit:
         shift = spread @ (rest.T @ self.residual) / self.variance
         return np.asarray(moved @ (spread + np.outer(shift, shift)) @ moved.T)
 
-    def left_out(self) -> tuple[Ints, Floats, Floats]:
-        """Measurements, and the root mean square residual of each from what the others predict, also studentised."""
+    def left_out(self) -> LeftOut:
+        """How far every measurement is from what the others predict.
+
+        Without those of measurement k, residuals e are r + H_k e_k, with e_k = (I - H_kk)^-1 r_k and H = J J⁺.
+        """
+        from scipy.special import chdtrc, fdtrc
+
         left = self._decomposed[0][:, : self.rank]
+        leverages = np.einsum("mr,mr->m", left, left)
         numbers = np.unique(self.groups)
-        raw, student = np.full(len(numbers), np.nan), np.full(len(numbers), np.nan)
+        raw, student, chances = (np.full(len(numbers), np.nan) for _ in range(3))
         total = float(self.residual @ self.residual)
         for k, number in enumerate(numbers):
             rows = np.flatnonzero(self.groups == number)
-            room = np.eye(len(rows)) - left[rows] @ left[rows].T
-            values, vectors = np.linalg.eigh(room)
+            values, vectors = np.linalg.eigh(np.eye(len(rows)) - left[rows] @ left[rows].T)
             seen = values > 1e-9
             if not seen.any():
                 continue
             parts = vectors[:, seen].T @ self.residual[rows]
             predicted = vectors[:, seen] @ (parts / values[seen])
             raw[k] = float(np.sqrt(np.mean(predicted**2)))
-            explained = float(parts @ (parts / values[seen]))
-            others = self.spare - int(seen.sum())
-            scale = 1.0 if self.has_sigma else (total - explained) / others if others > 0 else float("nan")
+            explained, count = float(parts @ (parts / values[seen])), int(seen.sum())
+            others = self.spare - count
+            scale = 1.0 if self.has_sigma else (total - explained) / others if others > 0 else np.nan
             if scale > 0.0:
-                student[k] = float(np.sqrt(explained / seen.sum() / scale))
-        return numbers, raw, student
+                student[k] = float(np.sqrt(explained / count / scale))
+            across = left @ (left[rows].T @ vectors[:, seen])
+            alike = np.isin(self.kinds, self.kinds[rows]) & (self.groups != number) & self._counted
+            spare = float((1.0 - leverages - (across**2 / values[seen]).sum(axis=1))[alike].sum())
+            if min(others, spare) < LEAST_OTHERS - 1e-6:
+                continue
+            rest = (self.residual + across @ (parts / values[seen]))[alike]
+            noise = max(float(rest @ rest) / spare, 1.0 if self.has_sigma else self.least_noise**2)
+            chances[k] = fdtrc(count, spare, explained / count / noise)
+            if self.has_sigma:
+                chances[k] = max(chances[k], chdtrc(count, explained))
+        return LeftOut(numbers, raw, student, chances)
+
+    def outliers(self, most: int) -> list[tuple[int, float]]:
+        """Numbers of the measurements that do not fit, and their studentised residuals, the worst first.
+
+        The worst is taken out, and the worst of the others, as often as may be: so none hides behind another. Those up
+        to the last that noise would hardly give do not fit: by the F distribution beside the others of its kind
+        (Student's t, of one number), of as many as there are, or as there are choices of those that hid it. Noise alone
+        names any in about one of a hundred fits.
+        """
+        worst: list[tuple[int, float]] = []
+        n_named, fit = 0, self
+        while len(worst) < most:
+            each = fit.left_out()
+            told = np.flatnonzero(np.isfinite(each.chances))
+            if not len(told):
+                break
+            k = told[np.lexsort((-each.student[told], each.chances[told]))[0]]
+            choices = math.comb(len(told) + len(worst) - n_named, len(worst) - n_named + 1)
+            worst.append((int(each.numbers[k]), float(each.student[k])))
+            if each.chances[k] * choices <= FALSE:
+                n_named = len(worst)
+            fit = fit._without(int(each.numbers[k]))
+        return worst[:n_named]
+
+    def _without(self, number: int) -> LinearFit:
+        """The fit of the other measurements, to first order."""
+        kept = self.groups != number
+        rows = (self.jacobian[kept], self.residual[kept], self.groups[kept], self.kinds[kept])
+        rest = LinearFit(*rows, self.has_sigma, self.least_noise)
+        across = rest._decomposed[0][:, : rest.rank]
+        return replace(rest, residual=rest.residual - across @ (across.T @ rest.residual))
+
+
+LEAST_NOISE = 1e-5
+"""Error that measurements of unknown quality are taken to have at least [L]: 10 um of 1 m. Simulated ones have none,
+and would seem to determine what no instrument shows."""
 
 
 def decomposed(matrix: Floats) -> tuple[Floats, Floats, Floats]:

@@ -11,7 +11,7 @@ import numpy as np
 from ...answers.solution import Solution
 from ...answers.start_configuration import start_of
 from ...answers.status import Status
-from ...common.arrays import Floats, Ints
+from ...common.arrays import Floats, Ints, Mask
 from ...common.rotations import to_rotvec
 from ...errors import InvalidArgument, InvalidMechanism
 from ...ik import solve_ik
@@ -40,6 +40,10 @@ class Residuals(NamedTuple):
     groups: Ints
 
 
+HAIR = 1e-6
+"""How far actuators may be from their readings [L or rad]: a tenth of what instruments show at best."""
+
+
 class Fit:
     """Measurements beside what a machine would give by the values of its parameters.
 
@@ -52,16 +56,18 @@ class Fit:
         self.machine = parameters.unlimited
         self.length = self.machine.characteristic_length
         self._columns = _sensor_columns(self.machine, measurements)
+        self._stretched: Mask = np.zeros(measurements.rows, dtype=bool)
+        """Rows that the machine as described reaches as nearly as it can, (n,): they may be so until the fit ends."""
         self._start: Configurations | None = None
         self._last_slopes: tuple[bytes, list[Residuals]] | None = None
         self._last: tuple[bytes, Mechanism, Solution] | None = None
 
     def begin(self, start: Solution | None) -> None:
-        """Assemble the machine as it is described at all readings.
+        """Assemble the machine as it is described at all readings; at some of them, as nearly as it can be.
 
         Raises
         ------
-        InvalidArgument : rows at which it cannot be.
+        InvalidArgument : it cannot be assembled at any.
         """
         if start is None and self.parameters.moves.any():
             self._start = None  # measured poses are those of another frame
@@ -74,11 +80,23 @@ class Fit:
         if not solution and start is None and self._start is not None:  # measured in another frame, or too far off
             self._start = self._last = None
             solution = self._assembled(self.parameters.values)[1]
-        self._start = copy(solution._configurations)
-        bad = np.flatnonzero(np.ravel(solution.status) != Status.REACHED)
-        if len(bad):
-            found = f"rows that '{self.machine.name}' as described cannot be assembled at"
-            raise InvalidArgument("actuators", found, "readings of this machine, in its units", rows=bad[:5].tolist())
+        is_apart = _is_apart(solution)
+        if not is_apart.any():
+            self._start = copy(solution._configurations)
+        self._stretched = np.ravel(solution.status) == Status.PROJECTED
+        if is_apart.all() or (is_apart & ~self._stretched).any():
+            raise self._not_assembled(is_apart, "described")
+
+    def require_assembled(self, values: Floats) -> None:
+        """InvalidArgument for readings at which the machine with these values cannot be assembled."""
+        is_apart = _is_apart(self._assembled(values)[1])
+        if is_apart.any():
+            raise self._not_assembled(is_apart, "calibrated")
+
+    def _not_assembled(self, is_apart: Mask, how: str) -> InvalidArgument:
+        found = f"rows that '{self.machine.name}' as {how} cannot be assembled at"
+        rows = np.flatnonzero(is_apart)[:5].tolist()
+        return InvalidArgument("actuators", found, "readings of this machine, in its units", rows=rows)
 
     def begin_at(self, values: Floats, solution: Solution) -> None:
         """Begin in configurations of the machine with other values of its parameters."""
@@ -132,32 +150,51 @@ class Fit:
                 raise
             described = self.blocks(self.parameters.values)
             return [block._replace(residual=np.full_like(block.residual, np.nan)) for block in described]
-        missing = np.ravel(solution.status) != Status.REACHED
+        status = np.ravel(solution.status)
+        is_apart = _is_apart(solution)
         poses = np.array(solution.pose)
-        poses[missing] = np.nan
+        poses[is_apart & ~(self._stretched & (status == Status.PROJECTED))] = np.nan
         q = np.array(solution.q) if slopes or self._columns else np.zeros((len(poses), 0))
         twists = rates = None
         if slopes:
-            if not missing.any():
+            if not is_apart.any():
                 self._start = copy(solution._configurations)  # a copy has its coordinates, which are of this geometry
-            changes = self.parameters.slopes(values)
-            moved = self.measurements.actuators[:, :, None] * self.parameters.factors.T
-            legs = None if missing.any() or self._columns else legs_that_stay(self.parameters)
-            by_legs = None if legs is None else legs.at(mechanism, solution._configurations, changes, moved)
-            if by_legs is not None:
-                twists, opened = by_legs.twists, by_legs.opened
-            else:
-                first = GeometrySlopes(mechanism, q - home_coordinates(mechanism), changes, self.parameters.like)
-                twists, rates = first.at_held_actuators(moved)
-                opened = first.opened
-                rates += changes.home.T
-            require_closed(opened, self.parameters)
+            twists, rates = self._rates(values, mechanism, solution, q, np.flatnonzero(~is_apart))
         if self.parameters.moves.any():
             poses, twists = seen(poses, twists, self._places(values), self.parameters.moves)
         blocks = list(self._blocks(poses, q, twists, rates))
         if slopes:
             self._last_slopes = values.tobytes(), blocks
         return blocks
+
+    def _rates(
+        self, values: Floats, mechanism: Mechanism, solution: Solution, q: Floats, rows: Ints
+    ) -> tuple[Floats, Floats | None]:
+        """Twists (n, 6, p) and, for sensors, rates of all coordinates (n, c, p) by the parameters.
+
+        Parameters
+        ----------
+        rows : where the machine is assembled; elsewhere it is at a dead point, and they are 0.
+        """
+        p, is_whole = len(self.parameters), len(rows) == len(q)
+        twists, rates = np.zeros((len(q), 6, p)), np.zeros((len(q), q.shape[1], p)) if self._columns else None
+        if not len(rows):
+            return twists, rates
+        changes = self.parameters.slopes(values)
+        moved = self.measurements.actuators[rows][:, :, None] * self.parameters.factors.T
+        legs = None if self._columns else legs_that_stay(self.parameters)
+        here = (solution if is_whole else solution[rows])._configurations
+        by_legs = None if legs is None else legs.at(mechanism, here, changes, moved)
+        if by_legs is not None:
+            twists[rows], opened = by_legs.twists, by_legs.opened
+        else:
+            first = GeometrySlopes(mechanism, q[rows] - home_coordinates(mechanism), changes, self.parameters.like)
+            twists[rows], own = first.at_held_actuators(moved)
+            opened = first.opened
+            if rates is not None:
+                rates[rows] = own + changes.home.T
+        require_closed(opened, self.parameters)
+        return twists, rates
 
     def _blocks(self, poses: Floats, q: Floats, twists: Floats | None, rates: Floats | None) -> Iterator[Residuals]:
         given, rows = self.measurements, np.arange(self.measurements.rows)
@@ -196,6 +233,12 @@ class Fit:
             kept = np.isfinite(given.joints[name])
             slopes = None if rates is None else rates[kept, column]
             yield Residuals("joints", q[kept, column] - given.joints[name][kept], slopes, rows[kept])
+
+
+def _is_apart(solution: Solution) -> Mask:
+    """Rows (n,) at which the machine is not assembled: a search may end a hair from readings that it can have."""
+    status, off = np.ravel(solution.status), np.ravel(solution.actuator_error)
+    return np.asarray((status > Status.PROJECTED) | ((status == Status.PROJECTED) & (off > HAIR)))
 
 
 def _sensor_columns(machine: Mechanism, measurements: Measurements) -> Mapping[str, int]:

@@ -133,11 +133,15 @@ class Measurements:
     absolute_sigma : bool, optional
         False if `sigma` only says how good quantities are relative to each other, and how good they all are is
         estimated from what is left.
+    names : sequence of str, optional
+        What a file calls the rows, n, and the distances, d, as in "row 3 does not fit". Default: their numbers from 1.
 
     Attributes
     ----------
     rows : int
         Number of configurations.
+    quantities : tuple of str
+        What was measured, of those that `sigma` may be of.
     has_deviations : bool
         True if it is known how good the measurements are.
     """
@@ -154,6 +158,7 @@ class Measurements:
         joints: Mapping[str, ArrayLike] | None = None,
         sigma: Sigma = None,
         absolute_sigma: bool = True,
+        names: Sequence[str] | None = None,
     ) -> None:
         self.actuators = array(
             "actuators", actuators, "n n_a", "finite readings", ", a row for each configuration"
@@ -175,6 +180,7 @@ class Measurements:
         self.joints = {name: _measured(f"joints['{name}']", v, f"{n}") for name, v in (joints or {}).items()}
         self.sigma = _sigmas(sigma)
         self.has_deviations = bool(self.sigma) and absolute_sigma
+        self._names = _checked_names(names, n + len(self.distances))
         if self.count == 0:
             raise InvalidArgument("measurements", "none", "a pose, position, orientation, height, distance or joint")
 
@@ -192,11 +198,65 @@ class Measurements:
             counts += 3 * int(np.isfinite(self.orientation).all(axis=(1, 2)).sum())
         return counts
 
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        return tuple(name for name in QUANTITIES if self._fields[name] is not None)
+
+    @property
+    def _fields(self) -> dict[str, Any]:
+        """What was measured by the names of `__init__`; None, or nothing, for what was not."""
+        return {name: getattr(self, name) for name in QUANTITIES[:3]} | {
+            "distances": self.distances if len(self.distances) else None,
+            "joints": self.joints or None,
+        }
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the rows, then the distances are called."""
+        return self._names or self._numbered(0)
+
+    def _numbered(self, before: int) -> tuple[str, ...]:
+        """Names of rows and distances by their numbers, behind so many other rows."""
+        rows = [f"row {row}" for row in range(before + 1, before + self.rows + 1)]
+        pairs = (before + 1 + self.pairs).tolist()
+        return (*rows, *(f"the distance of rows {first} and {second}" for first, second in pairs))
+
     def __len__(self) -> int:
         return self.rows
 
+    def __add__(self, other: Measurements) -> Measurements:
+        """Measurements of the same machine, the rows of the other behind these.
+
+        Raises
+        ------
+        InvalidArgument
+            Other actuators, or deviations of a quantity that differ.
+        """
+        if not isinstance(other, Measurements):
+            return NotImplemented
+        both = (self, other)
+        widths = [each.actuators.shape[1] for each in both]
+        if widths[0] != widths[1]:
+            raise InvalidArgument("measurements", f"{widths[1]} actuators a row", f"{widths[0]}, as of the others")
+        pairs = other.distances + [self.rows, self.rows, 0.0]
+        names = None
+        if self._names or other._names:
+            own, others = self.names, other._names or other._numbered(self.rows)
+            names = [*own[: self.rows], *others[: other.rows], *own[self.rows :], *others[other.rows :]]
+        sensors: dict[str, Any] = dict.fromkeys([*self.joints, *other.joints])
+        sensors = {name: _stacked([each.joints.get(name) for each in both], both) for name in sensors}
+        return Measurements(
+            np.concatenate([each.actuators for each in both]),
+            **{name: _stacked([getattr(each, name) for each in both], both) for name in QUANTITIES[:3]},
+            distances=np.concatenate([self.distances, pairs]) if len(self.distances) + len(pairs) else None,
+            joints=sensors,
+            sigma=_common_sigma(self, other),
+            absolute_sigma=self.has_deviations,
+            names=names,
+        )
+
     def __repr__(self) -> str:
-        given = [name for name in QUANTITIES[:3] if getattr(self, name) is not None]
+        given = [name for name in self.quantities if name in QUANTITIES[:3]]
         given += [f"{len(self.distances)} distances"] if len(self.distances) else []
         given += [f"joints {', '.join(self.joints)}"] if self.joints else []
         return f"<Measurements: {self.rows} rows, {self.count} values: {', '.join(given)}>"
@@ -207,8 +267,9 @@ class Measurements:
         place = np.full(self.rows, -1)
         place[kept] = np.arange(len(kept))
         pairs = place[self.pairs]
-        distances = np.column_stack([pairs, self.distances[:, 2]])[(pairs >= 0).all(axis=1)]
-        fields = {name: getattr(self, name) for name in ("position", "orientation", "height")}
+        spans = np.flatnonzero((pairs >= 0).all(axis=1))
+        distances = np.column_stack([pairs, self.distances[:, 2]])[spans]
+        fields = {name: getattr(self, name) for name in QUANTITIES[:3]}
         return Measurements(
             self.actuators[kept],
             **{name: None if value is None else value[kept] for name, value in fields.items()},
@@ -216,6 +277,7 @@ class Measurements:
             joints={name: value[kept] for name, value in self.joints.items()},
             sigma=self.sigma or None,
             absolute_sigma=self.has_deviations,
+            names=[self.names[k] for k in (*kept, *(self.rows + spans))],
         )
 
     def check_for(self, actuators: Sequence[str], coordinates: Sequence[str]) -> None:
@@ -224,6 +286,36 @@ class Measurements:
             expected = f"{len(actuators)} a row: {', '.join(actuators)}"
             raise InvalidArgument("measurements", f"{self.actuators.shape[1]} actuators a row", expected)
         require_known("coordinate", self.joints, coordinates)
+
+
+def _checked_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
+    """Names of rows and distances; none where they are only numbered."""
+    if names is None:
+        return ()
+    if len(names) != count:
+        raise InvalidArgument("names", f"{len(names)}", f"{count}: of every row and every distance")
+    return tuple(map(str, names))
+
+
+def _stacked(values: Sequence[Floats | None], both: Sequence[Measurements]) -> Floats | None:
+    """Values of two sets of rows as one; NaN for those that were not measured."""
+    shape = next((value.shape[1:] for value in values if value is not None), None)
+    if shape is None:
+        return None
+    parts = zip(values, both, strict=True)
+    return np.concatenate([np.full((each.rows, *shape), np.nan) if v is None else v for v, each in parts])
+
+
+def _common_sigma(first: Measurements, second: Measurements) -> dict[str, float] | None:
+    """Deviations of what was measured in either set."""
+    if bool(first.sigma) != bool(second.sigma) or first.has_deviations != second.has_deviations:
+        raise InvalidArgument("sigma", "deviations of some measurements beside none", "those of all, or none")
+    own = [{name: each.sigma[name] for name in each.quantities if name in each.sigma} for each in (first, second)]
+    for name in own[0].keys() & own[1].keys():
+        if own[0][name] != own[1][name]:
+            found = f"{own[0][name]:g} and {own[1][name]:g} of {name}"
+            raise InvalidArgument("sigma", found, "one deviation of a quantity, and `weights` of the rows")
+    return {**own[0], **own[1]} or None
 
 
 def _measured(name: str, values: ArrayLike, shape: str) -> Floats:

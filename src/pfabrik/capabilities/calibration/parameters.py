@@ -27,7 +27,8 @@ Free: TypeAlias = str | Sequence[str] | None
 or single parameters."""
 
 STEP = 1e-5
-"""Step of central differences of a geometry, in a parameter's scale: truncation and rounding both leave 1e-10."""
+"""Step of central differences of what follows from a geometry, in a parameter's scale: truncation and rounding both
+leave 1e-10."""
 
 
 class Parameters:
@@ -44,7 +45,8 @@ class Parameters:
     units : tuple of str
         The mechanism's unit of length, "rad", or "" for a dimension, which is as its file has it.
     scales : array (p,)
-        Changes that would be noticed: L, 1 rad, or the size of a dimension.
+        Changes that would be noticed: L, 1 rad, or of a dimension what moves a joint by L or turns an axis by 1 rad,
+        or its size if that is more.
     moves : array (p, 2, 6)
         Derivatives of the instrument's frame and target, a rotation vector and a place each.
     factors : array (p, n_a)
@@ -61,7 +63,7 @@ class Parameters:
         )
         own = [mechanism.dimensions[name] for name in dimensions]
         self.values = _read_only(np.array([*own, *(shift.value for shift in shifts)]))
-        self.scales = _read_only(np.array([*(abs(value) or 1.0 for value in own), *(s.scale for s in shifts)]))
+        self.scales = _read_only(np.append(self._dimension_scales(), [shift.scale for shift in shifts]))
         n, drives = len(dimensions), [drive.column for drive in mechanism.drives]
         self.moves = np.concatenate([np.zeros((n, 2, 6)), [shift.moves for shift in shifts] or np.zeros((0, 2, 6))])
         factors = [shift.factors[drives] for shift in shifts] or np.zeros((0, len(drives)))
@@ -137,11 +139,28 @@ class Parameters:
 
     def slopes(self, values: Floats) -> Geometry:
         """Derivatives of the geometry by the parameters at values (p,): every array with the parameters in front."""
-        steps = STEP * self.scales
-        grid = values + np.concatenate([np.diag(steps), -np.diag(steps)])
-        both = self._geometries(grid)
-        n = len(self)
-        return Geometry(*((a[:n] - a[n:]) / (2.0 * steps).reshape(n, *(1,) * (a.ndim - 1)) for a in both))
+        steps, n = STEP * self.scales, len(self._dimensions)
+        grid, drawn = np.concatenate([np.diag(steps), -np.diag(steps)]), None
+        if n:
+            own, changes = self._drawn.at(values[None, :n]), self._drawn.slopes(values[:n])
+            drawn = Geometry(*(a + np.tensordot(grid[:, :n], by, 1) for a, by in zip(own, changes, strict=True)))
+        both, p = self._shifted.at(values[n:] + grid[:, n:], drawn), len(self)
+        return Geometry(*((a[:p] - a[p:]) / (2.0 * steps).reshape(p, *(1,) * (a.ndim - 1)) for a in both))
+
+    def _dimension_scales(self) -> Floats:
+        """Changes of the dimensions that move some joint by L or turn an axis by 1 rad; or their own size, if more."""
+        n, length = len(self._dimensions), self.mechanism.characteristic_length
+        if not n:
+            return np.zeros(0)
+        points, axes, home, reference_point = self._drawn.slopes(self.values[:n])
+        is_angle = np.array([coordinate.kind == "angle" for coordinate in self.mechanism.coordinates])
+        moved = [points, length * axes.reshape(n, -1, 3), reference_point[:, None]]
+        sizes = [np.linalg.norm(np.nan_to_num(each), axis=2).max(axis=1, initial=0.0) for each in moved]
+        effects = np.max([*sizes, np.abs(home * np.where(is_angle, length, 1.0)).max(axis=1, initial=0.0)], axis=0)
+        own = np.abs(self.values[:n])
+        least = np.divide(length, effects, out=np.zeros(n), where=(effects > 0.0) & np.isfinite(effects))
+        scales = np.maximum(own, least)
+        return np.where(scales > 0.0, scales, 1.0)
 
     def _geometries(self, values: Floats) -> Geometry:
         """Geometries at values (b, p), every array with the batch in front."""

@@ -22,8 +22,8 @@ MOST_NAMED = 45
 def plot_calibration(calibration: Calibration) -> Figure:
     """Residuals of every measurement before and after, and changes of the parameters with their deviations.
 
-    Changes are in the scale of each parameter (L, 1 rad, or the size of a dimension), so that they fit one axis; those
-    that the data leave open have hollow markers.
+    Changes are in the scale of each parameter (L, 1 rad, or of a dimension its size or what moves a joint so far), so
+    that they fit one axis; those that the data leave open have hollow markers.
 
     Parameters
     ----------

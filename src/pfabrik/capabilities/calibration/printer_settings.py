@@ -40,6 +40,9 @@ The third tower's angle is left out, as the frame turns with it; where a tower's
 BY_HEIGHTS = 3
 """Stages that heights determine: a longer arm and a larger radius touch a flat bed in the same places."""
 
+PROBES = ("probe", "bltouch", "smart_effector")
+"""Sections of Klipper's probes."""
+
 DISTANCE_WEIGHT = 0.5
 """Weight of all distances together beside that of all heights, as Klipper's delta_calibrate has it."""
 
@@ -58,11 +61,14 @@ class Printer:
         The machine that `load` makes of the file. Its actuators count from the bed, wherever its endstops are.
     measurements : Measurements or None
         What Klipper's DELTA_CALIBRATE and DELTA_ANALYZE stored; None if nothing.
+    probe_offset : tuple of float
+        Place of Klipper's probe from the nozzle, z at its trigger [length]; 0 where the file has none.
     """
 
     mechanism: Mechanism
     described: Mechanism
     measurements: Measurements | None = None
+    probe_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -140,9 +146,19 @@ def read_printer(path: str | PathLike[str], *, sigma: Sigma = None) -> Printer:
         tops = dict(zip(described.actuator_names, (_tops(described) / _unit(described)).tolist(), strict=True))
         printer = Printer(read_mechanism(counted_from_endstops(table, tops)), described)
         settings = settings_of(text, file.parent)
-        return printer if settings is None else replace(printer, measurements=_measured(settings, described, sigma))
+        if settings is None:
+            return printer
+        measured = _measured(settings, described, sigma)
+        return replace(printer, measurements=measured, probe_offset=_probe_offset(settings))
     except InvalidMechanism as error:
         raise InvalidMechanism(error.faults, str(file)) from None
+
+
+def _probe_offset(settings: KlipperSettings) -> tuple[float, float, float]:
+    """Place of the probe from the nozzle, z at its trigger."""
+    section = next((name for name in PROBES if settings.text(name, "z_offset") is not None), PROBES[0])
+    x, y, z = (settings.number(section, f"{axis}_offset", 0.0) for axis in "xyz")
+    return x, y, z
 
 
 def _known(mechanism: Mechanism, stages: Sequence[Sequence[str]]) -> tuple[str, ...]:
@@ -206,26 +222,36 @@ def _measured(settings: KlipperSettings, described: Mechanism, sigma: Sigma) -> 
     rows: list[Floats] = []
     heights: list[float] = []
     distances: list[tuple[int, int, float]] = []
+    names: list[str] = []
+    spans: list[str] = []
     section = "delta_calibrate"
     for kind in ("height", "manual_height"):
         for number in range(1000):
-            steps = _numbers(settings, section, f"{kind}{number}_pos")
+            name = f"{kind}{number}"
+            steps = _numbers(settings, section, f"{name}_pos")
             if steps is None:
                 break
             rows.append(steps)
-            heights.append(settings.number(section, f"{kind}{number}"))
+            names.append(name)
+            heights.append(settings.number(section, name))
     for number in range(1000):
-        ends = [_numbers(settings, section, f"distance{number}_pos{end}") for end in (1, 2)]
+        name = f"distance{number}"
+        places = [f"{name}_pos{end}" for end in (1, 2)]
+        ends = [_numbers(settings, section, place) for place in places]
         if ends[0] is None or ends[1] is None:
             break
-        distances.append((len(rows), len(rows) + 1, settings.number(section, f"distance{number}")))
+        distances.append((len(rows), len(rows) + 1, settings.number(section, name)))
+        spans.append(name)
         rows += [ends[0], ends[1]]
+        names += places
         heights += [math.nan, math.nan]
     if not rows:
         return None
     per_step = np.array([_per_step(settings, letter, turn) for letter in TOWERS])
     readings = _tops(described) - np.array(rows) * per_step
     if sigma is not None or not distances:
-        return Measurements(readings, height=heights, distances=distances or None, sigma=sigma)
+        return Measurements(readings, height=heights, distances=distances or None, sigma=sigma, names=[*names, *spans])
     weights = {"height": math.sqrt(DISTANCE_WEIGHT * np.isfinite(heights).sum() / len(distances)), "distances": 1.0}
-    return Measurements(readings, height=heights, distances=distances, sigma=weights, absolute_sigma=False)
+    return Measurements(
+        readings, height=heights, distances=distances, sigma=weights, absolute_sigma=False, names=[*names, *spans]
+    )

@@ -16,7 +16,7 @@ from ...tolerances import TOLERANCES
 from ..statics.joint_balance import pairs_at
 from ..statics.loads import BodyLoads
 from .moving_rows import At, MovingRows, axes_of, in_si
-from .weights import weights_of
+from .weights import Weights, weights_of
 
 
 def mass_matrix(solution: Solution, at: str | Sequence[str] = "task", *, loads: BodyLoads | None = None) -> Floats:
@@ -40,10 +40,12 @@ def mass_matrix(solution: Solution, at: str | Sequence[str] = "task", *, loads: 
     Returns
     -------
     array (..., k, k)
-        Where the machine has fewer motions than `at` has coordinates, that of the possible motion nearest to the one
-        asked for, angles compared with lengths over L: of no higher rank than there are motions, with rows of zeros for
-        coordinates that never move. NaN where there is no configuration, the loops are in a constraint singularity, or
-        some motion that `at` has elsewhere cannot be made: there the machine resists it without bound.
+        Where the machine has more motions than `at` has coordinates, and actuators for all, what forces at these meet
+        while the actuators are free: (J M_a^-1 J')^-1, with M_a at the actuators (Khatib, IEEE J. Robotics and
+        Automation 3, 1987, 43). Where it has fewer, that of the possible motion nearest to the one asked for, angles
+        compared with lengths over L: of no higher rank than there are motions, with rows of zeros for coordinates that
+        never move. NaN where there is no configuration, the loops are in a constraint singularity, or some motion that
+        `at` has elsewhere cannot be made: there the machine resists it without bound.
 
     Raises
     ------
@@ -56,6 +58,8 @@ def mass_matrix(solution: Solution, at: str | Sequence[str] = "task", *, loads: 
     if weights.loaded:
         raise InvalidArgument(f"loads['{weights.loaded[0]}']", "a force", "(mass, centre): a force changes no mass")
     found = MovingRows(solution, named, weights=weights).efforts(["matrices"]).matrices
+    if named != "actuators":
+        _let_others_follow(solution, named, weights, found)
     few = np.flatnonzero(np.linalg.matrix_rank(np.nan_to_num(found), TOLERANCES.rank) < found.shape[1])
     few = few[~np.isnan(q[few]).any(axis=1)]
     if len(few):
@@ -64,13 +68,35 @@ def mass_matrix(solution: Solution, at: str | Sequence[str] = "task", *, loads: 
     return in_si(mechanism, named, found).reshape(*solution.shape, *found.shape[1:])
 
 
+def _let_others_follow(solution: Solution, at: At, weights: Weights, found: Floats) -> None:
+    """Fill the mass matrices (n, k, k) of machines with more motions than coordinates, all of them actuated."""
+    mechanism, q = solution.mechanism, solution._coordinates
+    rows = np.flatnonzero(~np.isnan(q).any(axis=1) & np.isfinite(found).all(axis=(1, 2)))
+    moved, driven = _moved(mechanism, at, q[rows])
+    n_motions = moved.shape[2]
+    if n_motions <= found.shape[1] or driven.shape[1] < n_motions or not len(rows):
+        return
+    at_actuators = MovingRows(solution, "actuators", weights=weights).efforts(["matrices"]).matrices[rows]
+    of_motions = np.swapaxes(driven, 1, 2) @ at_actuators @ driven
+    is_regular = (np.linalg.matrix_rank(moved, TOLERANCES.singular) == found.shape[1]) & (
+        np.linalg.matrix_rank(driven, TOLERANCES.singular) == n_motions
+    )
+    moved, of_motions = moved[is_regular], of_motions[is_regular]
+    followed = np.linalg.solve(of_motions, np.swapaxes(moved, 1, 2))
+    found[rows[is_regular]] = np.linalg.inv(moved @ followed)
+
+
+def _moved(mechanism: Mechanism, at: At, q: Floats) -> tuple[Floats, Floats]:
+    """What each of a machine's motions does to `at` (n, k, m), and to its actuators (n, n_a, m)."""
+    first = JointRates(model_of(mechanism), q)
+    twists, driven = pairs_at(mechanism, first)
+    if at == "task":
+        return axes_of(mechanism, at, end_effector_pose(mechanism, q))[..., : twists.shape[1]] @ twists, driven
+    return (driven if at == "actuators" else first.pairs[:, joint_path(mechanism, at).columns]), driven
+
+
 def _made(mechanism: Mechanism, at: At, q: Floats) -> Ints:
     """In how many ways a machine moves what `at` names, at coordinates q (n, c), (n,)."""
-    first = JointRates(model_of(mechanism), q)
-    twists, rates = pairs_at(mechanism, first)
-    if at == "task":
-        rates = axes_of(mechanism, at, end_effector_pose(mechanism, q))[..., : twists.shape[1]] @ twists
-    elif at != "actuators":
-        rates = first.pairs[:, joint_path(mechanism, at).columns]
+    rates, _ = _moved(mechanism, at, q)
     sizes, least = np.linalg.svd(rates, compute_uv=False), TOLERANCES.singular
     return np.asarray((sizes > least * np.maximum(sizes[:, :1], least)).sum(axis=1))

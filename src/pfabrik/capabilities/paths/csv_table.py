@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...common.arrays import Floats
 from ...common.cells import unmarked
+from ...common.checks import require_known, require_mapping, require_positive
 from ...common.csv_columns import CsvColumns, CsvRows
 from ...common.text_lines import WrongText
 from ...errors import InvalidArgument, near_miss
@@ -34,6 +36,9 @@ AMBIGUOUS = ("rx", "ry", "rz")
 OF_POSES = (*POSITION, *(column for columns in OF_ANGLES.values() for column in columns), *QUATERNION)
 NUMERIC = (*OF_POSES, "t", "feed")
 
+LENGTHS = (*POSITION, "feed")
+"""Columns of lengths, which one factor is for."""
+
 EXPECTED = "expected x, y, z and roll, pitch, yaw or qx, qy, qz, qw"
 
 
@@ -49,10 +54,14 @@ class CsvTable:
     WrongText
     """
 
-    def __init__(self, lines: Iterable[str], mechanism: Mechanism) -> None:
-        self._mechanism = mechanism
-        self._table = CsvColumns(lines, _spelled, NUMERIC, "x, y, z")
+    def __init__(self, lines: Iterable[str], mechanism: Mechanism, as_named: NamedColumns) -> None:
+        self._mechanism, self._scales = mechanism, as_named.scales
+        self._table = CsvColumns(lines, as_named.spelled, NUMERIC, "x, y, z")
         header = self._table.header
+        missing = [column for name, column in as_named.columns.items() if name not in header]
+        if missing:
+            known = ", ".join(as_named.columns.get(name, name.removeprefix(OF_FILE)) for name in header)
+            raise WrongText(f"line {self._table.line}: no column '{missing[0]}'; expected one of those there: {known}")
         by_joints = not any(name in OF_POSES for name in header)
         self._joints = joint_columns(mechanism, header) if by_joints else None
         if self._joints is None:
@@ -81,15 +90,50 @@ class CsvTable:
                 others[name] = [unmarked(cell) for cell in texts]
                 continue
             numbers = self._table.numbers(rows, name)
-            columns[name] = np.array(numbers, dtype=float)
+            columns[name] = np.array(numbers, dtype=float) * self._scales.get(name, 1.0)
+            if name in self._scales:
+                numbers = [f"{value!r}" for value in columns[name].tolist()]
             if name in ("t", "feed"):
                 others[name] = numbers
         return _path(columns, others, rows.lines, self._mechanism, self._joints)
 
 
-def _spelled(cell: str) -> str:
-    """The name of a column: those of poses also in capitals."""
-    return cell.lower() if cell.lower() in OF_POSES else unmarked(cell)
+@dataclass(frozen=True)
+class NamedColumns:
+    """What a file calls its columns, and factors on their numbers.
+
+    Attributes
+    ----------
+    columns : name of a column of targets -> what the file calls it.
+    scales : the same -> a factor on its numbers.
+    """
+
+    columns: Mapping[str, str]
+    scales: Mapping[str, float]
+
+    def spelled(self, cell: str) -> str:
+        """The name of a column: those of poses also in capitals; another that takes a given name is of the file."""
+        name = cell.lower() if cell.lower() in OF_POSES else unmarked(cell)
+        given = next((each for each, column in self.columns.items() if column == unmarked(cell)), "")
+        return given or (f"{OF_FILE}{name}" if name in self.columns else name)
+
+
+OF_FILE = "file_"
+"""Before the name of a column that the file calls so, where another was named so."""
+
+
+def named_columns(mechanism: Mechanism, columns: Any, scale: Any) -> NamedColumns:
+    """Names and factors of the columns of targets for a mechanism, checked."""
+    names = require_mapping("columns", columns, "name -> what the file calls the column")
+    for name, column in names.items():
+        if not isinstance(column, str):
+            raise InvalidArgument(f"columns['{name}']", repr(column), "what the file calls the column")
+    scales = scale if isinstance(scale, Mapping) else dict.fromkeys(LENGTHS, scale) if scale is not None else {}
+    joints = [f"{name}{unit}" for name in mechanism.coordinates_by_name for unit in ("", "_deg", "_rad")]
+    require_known("column", (*names, *scales), (*NUMERIC, *joints))
+    for name, factor in scales.items():
+        require_positive(f"scale of '{name}'", factor)
+    return NamedColumns(dict(names), {name: float(factor) for name, factor in scales.items()})
 
 
 class JointColumns(NamedTuple):

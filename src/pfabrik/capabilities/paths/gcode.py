@@ -140,11 +140,13 @@ ONE_PLACE = 1e-9
 
 
 class Move(NamedTuple):
-    """A place on the way: x, y, z, and a, b, c [deg]; the feed toward it, as of a `Path`; the line."""
+    """A place on the way: x, y, z, and a, b, c [deg]; the feed toward it, as of a `Path`; the line; the time at rest
+    before it [s], which is at the same place then."""
 
     place: Floats
     feed: float
     line: int
+    dwell: float = 0.0
 
 
 @dataclass
@@ -158,6 +160,7 @@ class ModalState:
     has_number : True once the program has given its number.
     passed : levelling and macros so far, with the first line of each.
     feed : as the program gives it, per minute; NaN before it does.
+    is_printers : True for a program of a printer, whose dwells count P in ms; others count it in s.
     """
 
     place: Floats
@@ -167,6 +170,7 @@ class ModalState:
     plane: int = 17
     feed: float = math.nan
     has_number: bool = False
+    is_printers: bool = False
     units: dict[int, float] = field(default_factory=dict)
     passed: dict[str, int] = field(default_factory=dict)
 
@@ -178,6 +182,7 @@ def steps_of(
     tolerance: float,
     longest: float,
     passed: dict[str, int] | None = None,
+    is_printers: bool = False,
 ) -> Iterator[Move]:
     """The steps of a program, the first at home.
 
@@ -188,15 +193,20 @@ def steps_of(
     tolerance : how far chords may be off their arc [length].
     longest : of a straight part of a move [length].
     passed : levelling and macros are added, with the first line of each.
+    is_printers : the program is a printer's, as one that feeds a filament (E) is anyway.
     """
     unit = METRES.get(length_unit.strip(), METRES["mm"])
     inches, millimetres = METRES["in"] / unit, METRES["mm"] / unit
     state = ModalState(np.array(home, dtype=float), millimetres, units={20: inches, 21: millimetres})
-    state.passed = {} if passed is None else passed
+    state.passed, state.is_printers = {} if passed is None else passed, is_printers
     yield Move(state.place.copy(), math.nan, 0)
     for number, text in enumerate(lines, 1):
         words = _words(text, number, state.passed)
+        state.is_printers |= "E" in words
         _obey(state, words, number)
+        dwell = _dwell(words, state.is_printers, number) if is_dwell(words) else 0.0
+        if dwell > 0.0:
+            yield Move(state.place.copy(), math.nan, number, dwell)
         moves = any(letter in words for letter in AXES)
         if state.motion is None and moves:
             raise WrongText(f"line {number}: a position without G0, G1, G2 or G3")
@@ -268,9 +278,7 @@ def _obey(state: ModalState, words: dict[str, list[float]], number: int) -> None
             state.unit = state.units[int(code)]
         elif code in (90, 91):
             state.is_relative = code == 91
-        elif code == 4 and not any(letter in words for letter in AXES):
-            continue  # a dwell
-        elif code in RETRACTS and not has_offset(f"G{code:g}", words, AXES):
+        elif (code == 4 and is_dwell(words)) or (code in RETRACTS and not has_offset(f"G{code:g}", words, AXES)):
             continue
         elif code in LEVELLING:
             state.passed.setdefault(f"G{code:g}", number)
@@ -282,6 +290,21 @@ def _obey(state: ModalState, words: dict[str, list[float]], number: int) -> None
         state.feed = words["F"][-1]
         if not state.feed > 0.0:
             raise WrongText(f"line {number}: found F{state.feed:g}; expected a feed above zero")
+
+
+def is_dwell(words: Mapping[str, Sequence[float]]) -> bool:
+    """True for G4, which moves no axis."""
+    return 4.0 in words.get("G", []) and not any(letter in words for letter in AXES)
+
+
+def _dwell(words: Mapping[str, Sequence[float]], is_printers: bool, number: int) -> float:
+    """Time of G4 [s]: P in ms in the firmwares of printers and in s elsewhere; S and F in s."""
+    units = {"S": 1.0, "F": 1.0, "P": 1e-3 if is_printers else 1.0}
+    letter = next((letter for letter in units if letter in words), "")
+    time = words[letter][-1] * units[letter] if letter else 0.0
+    if time < 0.0:
+        raise WrongText(f"line {number}: found {letter}{words[letter][-1]:g}; expected a time from zero")
+    return time
 
 
 def _move(

@@ -41,6 +41,8 @@ class Path(NamedTuple):
     passed : mapping of str to int
         What a program has that moves nothing of the path as it is here, levelling and macros, and the line where it is
         first.
+    dwells : array (n,) or None
+        Time at rest before each target, which is where the one before it is [s]; None where there is none.
     """
 
     targets: Floats
@@ -50,6 +52,7 @@ class Path(NamedTuple):
     others: Mapping[str, Sequence[str]]
     angle_units: tuple[AngleUnit, AngleUnit, AngleUnit]
     passed: Mapping[str, int] = MappingProxyType({})
+    dwells: Floats | None = None
 
     @classmethod
     def of(cls, targets: Floats) -> Path:
@@ -69,6 +72,7 @@ class Path(NamedTuple):
             targets=between(self.targets[begins], self.targets[ends], shares[:, None, None]),
             times=times,
             feeds=self.feeds[ends],
+            dwells=None,
             lines=[self.lines[end] for end in chosen],
             others={name: [cells[end] for end in chosen] for name, cells in self.others.items()},
         )
@@ -79,6 +83,7 @@ class Path(NamedTuple):
             targets=self.targets[first:],
             times=None if self.times is None else self.times[first:],
             feeds=self.feeds[first:],
+            dwells=None if self.dwells is None else self.dwells[first:],
             lines=self.lines[first:],
             others={name: cells[first:] for name, cells in self.others.items()},
         )
@@ -89,6 +94,7 @@ def joined(blocks: Iterable[Path]) -> Path:
     parts = list(blocks)
     first = parts[0]
     times = None if first.times is None else np.concatenate([each.times for each in parts if each.times is not None])
+    dwells = [each.dwells for each in parts if each.dwells is not None]
     return first._replace(
         targets=np.concatenate([each.targets for each in parts]),
         times=times,
@@ -96,4 +102,5 @@ def joined(blocks: Iterable[Path]) -> Path:
         lines=[line for each in parts for line in each.lines],
         others={name: [cell for each in parts for cell in each.others[name]] for name in first.others},
         passed=parts[-1].passed,
+        dwells=np.concatenate(dwells) if dwells else None,
     )

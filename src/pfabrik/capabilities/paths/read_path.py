@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BufferedReader
 from itertools import chain, islice, repeat
@@ -21,12 +21,15 @@ from ...common.rotations import to_rpy
 from ...common.text_lines import WrongText, as_text, lines_of, refusing
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.poses import pose
-from .csv_table import CsvTable
+from .csv_table import CsvTable, named_columns
 from .gcode import COMMENT, Move, steps_of
 from .path import BLOCK, MOST_STEPS, Path, joined
 from .sampling import at_rate, divided, timed
 
 GCODE = (".gcode", ".nc", ".ngc", ".g", ".gco", ".tap")
+PRINTERS = (".gcode", ".g", ".gco")
+"""Endings of programs, and those of printers' among them."""
+
 CHORD, LONGEST = 1e-5, 1e-2
 """Largest distance of a chord from its arc, and longest straight part of a move, as shares of L."""
 
@@ -42,6 +45,8 @@ def read_path(
     longest: float | None = None,
     rate: float | None = None,
     rapid: float | None = None,
+    columns: Mapping[str, str] | None = None,
+    scale: float | Mapping[str, float] | None = None,
 ) -> Path:
     """A path for a mechanism from a CSV file, or from G-code.
 
@@ -51,8 +56,9 @@ def read_path(
     others are handed on, and coordinates that the machine cannot change may be missing. In place of a pose there may be
     the coordinates of joints in series from base to end effector (pitch_joint, roll_joint; pivot[0], pivot[1]), angles
     in degrees or with _deg or _rad behind their names. G-code, by its file's ending or
-    if the first line is no header, begins at home and has G0 to G3, planes, G20, G21, G90, G91 and F per minute; A, B,
-    C are roll, pitch, yaw [deg]. Its moves come in steps.
+    if the first line is no header, begins at home and has G0 to G4, planes, G20, G21, G90, G91 and F per minute; A, B,
+    C are roll, pitch, yaw [deg]. Its moves come in steps. A dwell (G4) holds the pose for its time: S in s, P in ms in
+    printers' programs (.gcode, .g, .gco, or with E) and in s in others, as LinuxCNC and Grbl have it.
 
     Parameters
     ----------
@@ -68,6 +74,10 @@ def read_path(
         Steps per second instead, between the targets straight on [1/s].
     rapid : float, optional
         Feed of rapid moves [length/s], which say none.
+    columns : mapping of str to str, optional
+        What a table calls its columns: ``{"t": "time", "x": "surge [m]", "roll_rad": "roll"}``, of a recording say.
+    scale : float or mapping of str to float, optional
+        Factor on a table's lengths, x, y, z and feed (1000 from m to mm), or on columns by name: ``{"t": 1e-3}``.
 
     Raises
     ------
@@ -75,7 +85,10 @@ def read_path(
         A file that is no path, with its line; one of more than a million targets; a rate for a path that says nothing
         of time.
     """
-    path_read = joined(path_blocks(path, mechanism, tolerance=tolerance, longest=longest, rate=rate, rapid=rapid))
+    blocks = path_blocks(
+        path, mechanism, tolerance=tolerance, longest=longest, rate=rate, rapid=rapid, columns=columns, scale=scale
+    )
+    path_read = joined(blocks)
     if path_read.times is not None and not np.isfinite(path_read.times).all():
         return path_read._replace(times=None)
     return path_read
@@ -89,6 +102,8 @@ def path_blocks(
     longest: float | None = None,
     rate: float | None = None,
     rapid: float | None = None,
+    columns: Mapping[str, str] | None = None,
+    scale: float | Mapping[str, float] | None = None,
     sample_time: float | None = None,
     most: int | None = None,
 ) -> Iterator[Path]:
@@ -106,19 +121,23 @@ def path_blocks(
     for option, value in lengths_and_times.items():
         if value is not None:
             require_positive(option, value)
+    as_named = named_columns(mechanism, {} if columns is None else columns, scale)
     file = require_path("path", path)
     name = "standard input" if str(file) == "-" else str(file)
     with refusing(name, "CSV or G-code that can be followed"), _opened(file) as handle:
         is_table, lines = _begun(lines_of(handle, 10 * most, "a path"), file.suffix.lower())
+        if not is_table and (as_named.columns or as_named.scales):
+            raise WrongText("G-code; expected a table, of which columns and scale are")
         if is_table:
-            table = CsvTable(lines, mechanism)
+            table = CsvTable(lines, mechanism, as_named)
             blocks, has_times = _counted(table.blocks(), most), table.has_times
             if longest is not None:
                 blocks = divided(blocks, longest)
         else:
             step = LONGEST * length if longest is None else longest
             passed: dict[str, int] = {}
-            program = steps_of(lines, _home(mechanism), mechanism.length_unit, chord, step, passed)
+            is_printers = file.suffix.lower() in PRINTERS
+            program = steps_of(lines, _home(mechanism), mechanism.length_unit, chord, step, passed, is_printers)
             blocks, has_times = _program(program, passed, most), True
         if has_times or sample_time is not None or rate is not None:
             blocks = timed(blocks, sample_time, rapid)
@@ -181,7 +200,8 @@ def _program(steps: Iterator[Move], passed: dict[str, int], most: int) -> Iterat
         places = np.array([step.place for step in part])
         targets = pose(places[:, :3], rpy=places[:, 3:], degrees=True)
         feeds, lines = np.array([step.feed for step in part]), [step.line for step in part]
-        yield Path(targets, None, feeds, lines, {}, ("deg", "deg", "deg"), dict(passed))
+        dwells = np.array([step.dwell for step in part])
+        yield Path(targets, None, feeds, lines, {}, ("deg", "deg", "deg"), dict(passed), dwells)
     if count < 2:
         raise WrongText("no moves; expected CSV or G-code")
 

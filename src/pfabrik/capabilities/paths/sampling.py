@@ -31,7 +31,8 @@ def timed(blocks: Iterable[Path], sample_time: float | None, rapid: float | None
             block = block._replace(times=sample_time * np.arange(count, count + steps, dtype=np.float64))
         elif block.times is None:
             targets = np.concatenate([block.targets[:1] if before is None else before, block.targets])
-            times = since + np.cumsum(_durations(targets, block.feeds, rapid))
+            dwells = 0.0 if block.dwells is None else block.dwells
+            times = since + np.cumsum(_durations(targets, block.feeds, rapid) + dwells)
             since = float(times[-1])
             block = block._replace(times=times)
         count, before = count + steps, block.targets[-1:]

@@ -94,12 +94,13 @@ def _curves(s: Floats, values: Floats) -> Floats:
     return curves
 
 
-def curve_of(track: Track) -> Curve:
-    """The curve through a path."""
-    mechanism = track.mechanism
-    moves = np.linalg.norm(np.diff(track.actuators, axis=0) / actuator_units(mechanism), axis=1)
+def curve_of(track: Track, rows: slice = slice(None)) -> Curve:
+    """The curve through a path, or through some of its rows."""
+    mechanism, first = track.mechanism, rows.start or 0
+    moves = np.linalg.norm(np.diff(track.actuators[rows], axis=0) / actuator_units(mechanism), axis=1)
     steps = np.concatenate([[0], 1 + np.flatnonzero(moves > TOLERANCES.position)])
     s = np.concatenate([[0.0], np.cumsum(moves[steps[1:] - 1])])
+    steps = steps + first
     poses = np.ascontiguousarray(track.pose[steps])
     values = np.ascontiguousarray(np.concatenate([track.actuators[steps], poses[:, :3, 3]], axis=1))
     return Curve(s, values, _curves(s, values), steps, poses, track.actuators.shape[1])

@@ -13,7 +13,7 @@ from .curve import Curve
 from .timed import EXCEEDED, Exceeded, What
 from .torque_path import TorquePath
 
-LOOKS, CLOSER_LOOKS = np.array([0.25, 0.75]), np.linspace(0.0, 1.0, 17)
+LOOKS, CLOSER_LOOKS = np.array([0.06, 0.25, 0.5, 0.75, 0.94]), np.linspace(0.0, 1.0, 17)
 """When limits are looked at within a cell of the grid, at whose ends they are kept, by its duration; and within one in
 which a limit is exceeded, or an actuator turns back: there dry friction leaps."""
 
@@ -22,7 +22,10 @@ ZOOMS = 3
 
 CELLS_A_BLOCK = 2000
 
-SPLINED, DOUBLINGS = 1e-4, 3
+SAME = 1e-12
+"""Difference of squared speeds, by the largest, up to which two timings are the same."""
+
+SPLINED, DOUBLINGS = 1e-4, 10
 """Share of a limit of torque up to which splines are exact: a tenth of what is told; and how often their places are
 doubled for that."""
 
@@ -137,11 +140,26 @@ def with_exact_torques(curve: Curve, timing: Timing, limits: Limits) -> Limits:
     return limits._replace(path=path)
 
 
-def cells_over(curve: Curve, timing: Timing, limits: Limits) -> Mask:
-    """True for the cells of the grid between whose ends a limit is exceeded by more than half of what is told."""
-    blocks = np.array_split(np.arange(len(timing.durations)), -(-len(timing.durations) // CELLS_A_BLOCK))
-    over = [_used(curve, timing, limits, cells, LOOKS) > 1.0 + 0.5 * EXCEEDED for cells in blocks]
-    return np.concatenate([each.any(axis=(1, 2)) for each in over])
+def cells_over(curve: Curve, timing: Timing, limits: Limits, before: Timing | None = None) -> Mask:
+    """True for the cells of the grid between whose ends a limit is exceeded by more than half of what is told.
+
+    Parameters
+    ----------
+    before : a timing whose cells are known not to be over where this one is the same, but for those that are parted.
+    """
+    over = np.zeros(len(timing.durations), bool)
+    looked_at = np.ones(len(over), bool)
+    if before is not None:  # x is straight between points
+        differs = np.abs(np.interp(timing.s, before.s, before.x) - timing.x) > SAME * timing.x.max()
+        differs |= ~np.isin(timing.s, before.s)
+        looked_at = differs[1:] | differs[:-1]
+    for cells in _blocks(np.flatnonzero(looked_at)):
+        over[cells] = (_used(curve, timing, limits, cells, LOOKS) > 1.0 + 0.5 * EXCEEDED).any(axis=(1, 2))
+    return over
+
+
+def _blocks(cells: Ints) -> list[Ints]:
+    return np.split(cells, range(CELLS_A_BLOCK, len(cells), CELLS_A_BLOCK)) if len(cells) else []
 
 
 def exceeded(curve: Curve, timing: Timing, limits: Limits, actuators: tuple[str, ...]) -> tuple[Exceeded, ...]:
@@ -152,8 +170,7 @@ def exceeded(curve: Curve, timing: Timing, limits: Limits, actuators: tuple[str,
     signs = np.sign(curve.at(timing.s, 1)[:, : curve.n_actuators])
     rubs = False if limits.path is None else limits.path.rubs
     turns_back = ((signs[1:] != signs[:-1]) & rubs).any(axis=1)
-    looked_at = np.flatnonzero(cells_over(curve, timing, limits) | turns_back)
-    for cells in np.split(looked_at, range(CELLS_A_BLOCK, len(looked_at), CELLS_A_BLOCK)) if len(looked_at) else ():
+    for cells in _blocks(np.flatnonzero(cells_over(curve, timing, limits) | turns_back)):
         used = _used(curve, timing, limits, cells, CLOSER_LOOKS)
         durations += (used > 1.0 + EXCEEDED).mean(axis=1).T @ timing.durations[cells]
         for place in np.flatnonzero(used.max(axis=(0, 1)) > 1.0 + 0.5 * EXCEEDED).tolist():

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from ...answers.solution import Solution
 from ...answers.tracked import Track, refuse_leaps
+from ...common.arguments import array, is_not_negative
 from ...common.arrays import Floats
 from ...common.checks import require_positive, require_type
 from ...errors import InvalidArgument
@@ -22,6 +23,7 @@ from ..statics.forces import GRAVITY
 from ..statics.loads import BodyLoads, checked_gravity
 from .curve import Curve, curve_of, refuse_crossings
 from .exceeded import Limits, Timing, cells_over, exceeded, motion_at, with_exact_torques
+from .pauses import pieces_of, with_pauses
 from .timed import Timed
 from .torque_path import TorqueParts, TorquePath, TorqueSource
 
@@ -49,6 +51,7 @@ def time_path(
     loads: BodyLoads | None = None,
     gravity: ArrayLike = GRAVITY,
     rate: float = 1000.0,
+    dwells: ArrayLike | None = None,
 ) -> Timed:
     """The fastest timing of a path that was followed, from rest to rest, within the limits of every actuator.
 
@@ -68,7 +71,7 @@ def time_path(
     torque : float or mapping of str to float, optional
         The most that actuators exert, by name or the same for all [N m, of slides N]; those not named have the
         `max_torque` of their joints, which counts where the machine has the masses of all bodies. Rotors and friction
-        are included, as in `inverse_dynamics`; between some hundred places of the path torques are a spline. Redundant
+        are included, as in `inverse_dynamics`. Redundant
         actuators share what they do in any way that keeps their limits: at these are several at once. What the timing
         exceeds is in `exceeded`.
     loads : mapping of str to tuple, optional
@@ -77,6 +80,8 @@ def time_path(
         For torques, likewise [m/s²].
     rate : float, optional
         Rate of the samples that are returned [1/s].
+    dwells : array (n,), optional
+        Time at rest before each step [s], as a `Path` has it: the path stops there, and its parts are timed one by one.
 
     Raises
     ------
@@ -104,14 +109,21 @@ def time_path(
     if not len(track):
         raise InvalidArgument("track", "an empty path", "two steps or more that differ")
     refuse_leaps(track)
-    curve = curve_of(track)
-    if len(curve.s) < 2:
-        raise InvalidArgument("track", "a path that does not move", "two steps or more that differ")
+    pauses = np.zeros(len(track)) if dwells is None else array("dwells", dwells, f"{len(track)}", holds=is_not_negative)
+    pause, parts = 0.0, []
     refuse_crossings(track)
-    refuse_swings(track, curve)
-    limits = Limits(speeds, accelerations, most_platform, torques, _torques(track, curve, torques, loads, gravity))
-    timing, limits = _fastest(curve, limits)
-    return _sampled(track, curve, timing, limits, every)
+    for dwell, rows in pieces_of(pauses):
+        pause, curve = pause + dwell, curve_of(track, rows)
+        if len(curve.s) < 2:
+            continue
+        refuse_swings(track, curve)
+        limits = Limits(speeds, accelerations, most_platform, torques, _torques(track, curve, torques, loads, gravity))
+        timing, limits = _fastest(curve, limits)
+        parts.append((pause, _sampled(track, curve, timing, limits, every)))
+        pause = 0.0
+    if not parts:
+        raise InvalidArgument("track", "a path that does not move", "two steps or more that differ")
+    return with_pauses(parts, pause, every)
 
 
 def _torques(
@@ -153,16 +165,17 @@ def refuse_swings(track: Track, curve: Curve) -> None:
 
 def _fastest(curve: Curve, limits: Limits) -> tuple[Timing, Limits]:
     """The fastest timing on a grid that is as fine as torques need it, and its limits, exact where it is."""
-    s = curve.grid()
+    s, before = curve.grid(), None
     timing = _fastest_on(s, curve, limits)
-    if limits.path is not None:
-        limits = with_exact_torques(curve, timing, limits)
-    for _ in range(REFINEMENTS if limits.path is not None else 0):
-        over = cells_over(curve, timing, limits)
+    if limits.path is None:
+        return timing, limits
+    limits = with_exact_torques(curve, timing, limits)
+    for _ in range(REFINEMENTS):
+        over = cells_over(curve, timing, limits, before)
         if not over.any():
             break
         over[1:-1] |= over[2:] | over[:-2]
-        s = np.sort(np.append(s, 0.5 * (s[1:] + s[:-1])[over]))
+        s, before = np.sort(np.append(s, 0.5 * (s[1:] + s[:-1])[over])), timing
         timing = _fastest_on(s, curve, limits)
     return timing, limits
 
@@ -232,6 +245,7 @@ def _sampled(track: Track, curve: Curve, timing: Timing, limits: Limits, every: 
     times = np.append(times[times < reached[-1] - 1e-9 * every], reached[-1])
     cells = np.clip(np.searchsorted(reached, times, side="right") - 1, 0, len(reached) - 2)
     places, *motion = timing.at(cells, times - reached[cells])
+    motion[0][-1] = timing.speeds[-1]  # not rounding, of which friction would have a sign
     sampled = motion_at(curve, limits, places, *motion)
     return Timed(
         mechanism=track.mechanism,

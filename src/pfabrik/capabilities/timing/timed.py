@@ -88,8 +88,7 @@ class Timed(Printed):
         actuators are at their limits of torque several at once: "A1 and A3".
     exceeded : tuple of Exceeded
         Those that are exceeded by more than a thousandth, by how much, when and where, the most first; empty where all
-        are kept. It is looked for between the samples too. So may torques be, where they change faster than the grid
-        that the timing is computed on.
+        are kept. It is looked for between the samples too.
     """
 
     mechanism: Mechanism

@@ -57,7 +57,20 @@ class VariedGeometry:
         (found, _), n = self._formulas(np.empty(0), values), len(self._decided)
         for row in np.flatnonzero((found[:, :n] != self._decided).any(axis=1)):
             found[row, n:] = NotedReading(self._mechanism, self._names, values[row]).numbers
-        own, joints = self._own, len(self._has_axes)
-        parts = np.split(found[:, n:], np.cumsum([AT_POINTS - AT_REFERENCE, 3 * joints, 6 * joints]), axis=1)
-        axes = np.where(self._has_axes[:, :, None], parts[2].reshape(-1, joints, 2, 3), own.axes)
+        return self._geometry(found[:, n:], self._own.axes)
+
+    def slopes(self, values: Floats) -> Geometry:
+        """Derivatives of the geometry at values (n,) by the dimensions: every array with these in front."""
+        given, n = (np.empty(0), values[None], np.eye(len(values))), len(self._decided)
+        numbers, slopes = self._formulas(*given)
+        if (numbers[0, :n] != self._decided).any():
+            reading, n = NotedReading(self._mechanism, self._names, values), 0
+            slopes = Formulas(reading.numbers, reading.given, 0)(*given)[1]
+        return self._geometry(slopes[0, n:].T, np.zeros_like(self._own.axes))
+
+    def _geometry(self, numbers: Floats, following: Floats) -> Geometry:
+        """Rows of numbers (b, r) as arrays of a geometry, with axes (joints, 2, 3) where these follow from centres."""
+        joints = len(self._has_axes)
+        parts = np.split(numbers, np.cumsum([AT_POINTS - AT_REFERENCE, 3 * joints, 6 * joints]), axis=1)
+        axes = np.where(self._has_axes[:, :, None], parts[2].reshape(-1, joints, 2, 3), following)
         return Geometry(parts[1].reshape(-1, joints, 3), axes, parts[3], parts[0])
