@@ -479,6 +479,12 @@ def test_redundant_actuators_share_the_work_within_their_limits() -> None:
     np.testing.assert_allclose(*forearm, atol=1e-6)  # what its ends pass moves it, whoever drives
 
 
+def test_numbers_that_overflow_have_a_reason() -> None:
+    solution, *_ = somewhere(weighed(pf.load("stewart")))
+    found = pf.inverse_dynamics(solution, twists=np.full(6, 1e200))
+    assert np.isnan(found.actuators).all() and "too large" in str(found.reason)
+
+
 def test_rows_without_a_configuration_have_a_reason() -> None:
     machine = weighed(pf.load("delta"))
     targets = [machine.home_pose[:3, 3], [np.nan] * 3]
