@@ -51,8 +51,8 @@ def identify(
 
     The most likely values, by weighted least squares, of those that bodies can have. Each parameter is expected to be
     as the file has it, and off by as much as its body weighs: what the efforts do not determine stays there. A rod
-    between two ball joints, on whose line its centre is, keeps its moment about that; other parts that nothing holds are
-    taken to move as the masses of the file would.
+    between two ball joints, on whose line its centre is, keeps its moment about that; other parts that nothing holds
+    are taken to move as the masses of the file would.
 
     Parameters
     ----------
