@@ -265,11 +265,18 @@ def test_deviations_count_rows_whose_noise_follows_from_the_row_before_for_less(
 
 @pytest.mark.campaign
 def test_wrong_efforts_are_doubted_on_four_machines_of_five_and_right_ones_on_one_in_twenty() -> None:
-    doubted = dict.fromkeys(WRONG, 0)
+    doubted = dict.fromkeys([*WRONG, "other motion", "other masses"], 0)
     for name in RECORDED:
         drawing, measured, noise = recorded(name, 3)
         for wrong, made in WRONG.items():
             doubted[wrong] += bool(doubt_of(drawing, measured, made(measured[1]) + noise))
+        doubted["other motion"] += bool(doubt_of(drawing, measured, recorded(name, 80)[1][1] + noise))
+        body = drawing.masses[-1].body
+        off = [
+            pf.Mass(m.body, (1.0 + (-1.0) ** k * 0.4) * m.mass, m.centre, m.inertia)
+            for k, m in enumerate(drawing.masses)
+        ]
+        doubted["other masses"] += bool(doubt_of(drawing.with_masses(off), measured, measured[1] + noise, bodies=body))
     assert min(doubted.values()) >= 4, doubted
     right = [recorded(name, 100 + seed) for name in ("five_bar", "prr") for seed in range(50)]
     assert sum(bool(doubt_of(drawing, measured, measured[1] + noise)) for drawing, measured, noise in right) <= 5
