@@ -37,6 +37,19 @@ def weighed(machine: pf.Mechanism, seed: int = 1, own: dict[str, float] | None =
     return machine.with_masses(masses)
 
 
+def motorised(machine: pf.Mechanism, seed: int = 7) -> pf.Mechanism:
+    """The machine with random rotors, gears, friction and limits of its motors."""
+    random = np.random.default_rng(seed)
+    joints = []
+    for joint in machine.joints:
+        count = len(joint.driven)
+        said = {key: random.uniform(0.5, 2.0, count) for key in ("rotor_inertia", "gear", "max_torque", "max_speed")}
+        said |= {"friction": random.uniform(0.1, 0.5, (count, 2))}
+        drive: Any = {key: value if count > 1 else value[0] for key, value in said.items()} if count else {}
+        joints.append(dataclasses.replace(joint, **drive))
+    return dataclasses.replace(machine, joints=tuple(joints))
+
+
 def units(machine: pf.Mechanism) -> Any:
     """Of actuators: those of their coordinates in L, and in SI."""
     length, metres = machine.characteristic_length, metres_of(machine.length_unit)
@@ -54,16 +67,14 @@ def somewhere(machine: pf.Mechanism, seed: int = 5) -> Any:
     return solution, rates, 3.0 * gains
 
 
-def by_mujoco(machine: pf.Mechanism, solution: pf.Solution, rates: Any, gains: Any, gravity: Any) -> Any:
-    """Actuator forces and mass matrix of the exported model, by its constraint rows; their rate by differences."""
+def by_mujoco(text: str, start: Any, rates: Any, gains: Any) -> Any:
+    """Actuator forces and mass matrix of a closed model, by its constraint rows; their rate by differences."""
     mujoco = pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_string(pf.interop.to_mjcf(machine, gravity=gravity))
+    model = mujoco.MjModel.from_xml_string(text)
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     model.site_sameframe[:] = int(mujoco.mjtSameFrame.mjSAMEFRAME_NONE)
-    model.dof_armature[:] = 0.0
-    model.dof_damping[:] = 0.0
-    data, start = mujoco.MjData(model), pf.interop.qpos(solution)
+    data = mujoco.MjData(model)
 
     def rows(qpos: Any) -> Any:
         data.qpos[:] = qpos
@@ -85,7 +96,8 @@ def by_mujoco(machine: pf.Mechanism, solution: pf.Solution, rates: Any, gains: A
     drift = (8.0 * (after(h) - after(-h)) - (after(2 * h) - after(-2 * h))) / (12.0 * h)
     data.qpos[:], data.qvel[:] = start, v
     mujoco.mj_forward(model, data)
-    mass, bias = np.zeros((model.nv, model.nv)), data.qfrc_bias.copy()
+    bias = data.qfrc_bias - data.qfrc_passive + model.dof_frictionloss * np.sign(v)
+    mass = np.zeros((model.nv, model.nv))
     for k, one in enumerate(np.eye(model.nv)):
         mujoco.mj_mulM(model, data, mass[k], one)
     least = -np.linalg.pinv(conditions, rcond=1e-7) @ drift if len(drift) else np.zeros(model.nv)
@@ -103,11 +115,13 @@ def by_mujoco(machine: pf.Mechanism, solution: pf.Solution, rates: Any, gains: A
 
 @pytest.mark.parametrize("name", [*WITHOUT_IDLE, *WITH_IDLE])
 def test_efforts_and_mass_matrices_are_mujocos(name: str) -> None:
-    machine = weighed(pf.load(name))
+    """Of the exported model as it is: with its rotors, its friction, and nothing that is made up."""
+    machine = motorised(weighed(pf.load(name)))
     solution, rates, gains = somewhere(machine)
     rates, gravity = rates * (name in WITHOUT_IDLE), (1.0, -2.0, -9.0)  # how fast what is idle spins is a choice
     found = pf.inverse_dynamics(solution, twists=rates, accelerations=gains, at="actuators", gravity=gravity)
-    forces, mass = by_mujoco(machine, solution, *units(machine)[1] * [rates, gains], gravity)
+    text = pf.interop.to_mjcf(machine, gravity=gravity)
+    forces, mass = by_mujoco(text, pf.interop.qpos(solution), *units(machine)[1] * [rates, gains])
     assert found.reason == ""
     np.testing.assert_allclose(found.actuators, forces, atol=1e-9 * np.abs(forces).max())
     np.testing.assert_allclose(pf.mass_matrix(solution, "actuators"), mass, atol=1e-9 * np.abs(mass).max())
@@ -463,6 +477,12 @@ def test_redundant_actuators_share_the_work_within_their_limits() -> None:
     np.testing.assert_allclose(found.power.sum(), alone.power.sum(), rtol=1e-7)
     forearm = [each.reactions["p2"][1:3] - each.reactions["p3"][1:3] for each in (found, shared)]
     np.testing.assert_allclose(*forearm, atol=1e-6)  # what its ends pass moves it, whoever drives
+
+
+def test_numbers_that_overflow_have_a_reason() -> None:
+    solution, *_ = somewhere(weighed(pf.load("stewart")))
+    found = pf.inverse_dynamics(solution, twists=np.full(6, 1e200))
+    assert np.isnan(found.actuators).all() and "too large" in str(found.reason)
 
 
 def test_rows_without_a_configuration_have_a_reason() -> None:

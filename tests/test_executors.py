@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
@@ -110,7 +109,7 @@ def test_maps_are_the_same_wherever_they_are_worked_out(executor: Executor) -> N
 @pytest.mark.compiled
 @pytest.mark.filterwarnings("default")
 def test_verdicts_are_the_same_wherever(executor: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["pfabrik.capabilities.certify.question"], "CELLS_A_BLOCK", 20)
+    monkeypatch.setattr("pfabrik.capabilities.certify.question.CELLS_A_BLOCK", 20)
     machine = pf.load("hexaglide")
     home, size = machine.home_pose[:3, 3], 0.06 * machine.characteristic_length
     for rotation, budget, verdict in ((0.13, 10_000, "PROVED"), (0.15, 10_000, "REFUTED"), (0.13, 5, "OPEN")):

@@ -201,7 +201,7 @@ def test_solids_move_with_their_bodies_where_home_is_closed_first() -> None:
 
 def test_a_body_that_becomes_part_of_a_joint_loses_its_solids_by_name() -> None:
     crossed = """
-    <mujoco><worldbody><body name="cross" pos="0 0 0.1"><joint name="jx" axis="1 0 0"/><geom size="0.01"/>
+    <mujoco><worldbody><body name="cross" pos="0 0 0.1"><joint name="jx" axis="1 0 0"/><geom size="0.01" mass="0"/>
       <body name="bar"><joint name="jy" axis="0 1 0"/>
         <body name="end" pos="0 0 0.2"><joint name="slide" type="slide" axis="0 0 1"/><geom size="0.02"/></body>
     </body></body></worldbody><actuator><motor joint="slide"/></actuator></mujoco>"""
@@ -209,6 +209,9 @@ def test_a_body_that_becomes_part_of_a_joint_loses_its_solids_by_name() -> None:
     assert [joint.type for joint in found.mechanism.joints] == ["universal", "prismatic"]
     assert [shape.body for shape in found.mechanism.shapes] == ["end"]
     assert "within a joint is left out, of: cross" in notes_of(found)
+    heavy = from_mjcf(crossed.replace(' mass="0"', ""), end_effector="end").mechanism
+    assert [joint.type for joint in heavy.joints] == ["revolute", "revolute", "prismatic"]
+    assert [shape.body for shape in heavy.shapes] == ["cross", "end"]
 
 
 SOLID_URDF = """

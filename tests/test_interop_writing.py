@@ -20,6 +20,7 @@ from pfabrik.exchange.interop import from_mjcf, to_mjcf, verify
 from pfabrik.exchange.interop.referee import reached_at_random
 from pfabrik.machine.description.links import links_of
 from pfabrik.machine.files.units import metres_of
+from test_dynamics import weighed
 
 LIKE_OTHERS = ("ankle_ups", "hexaglide", "linear_delta", "nrpm", "panda", "prr", "psu", "reachy_mini", "rps", "rrr")
 """Machines whose joints and loops others of the catalogue have too."""
@@ -109,6 +110,31 @@ def test_servos_that_are_asked_for_too_much_at_once_do_not_blow_up(name: str) ->
     assert np.isfinite(model.data.qpos).all()
     assert np.abs(model.data.qvel).max() < 1e3
     assert not any(model.data.warning[kind].number for kind in range(len(model.data.warning)))
+
+
+@pytest.mark.parametrize("name", ["stewart", "delta", "nrpm", "g1_ankle", "five_bar"])
+@pytest.mark.parametrize("what", ["solids", "points", "nothing but the end effector"])
+def test_models_of_machines_with_masses_stay_closed_and_still(name: str, what: str) -> None:
+    """With weight, for 0.3 s: though nothing is made up of solids, and points hardly resist turning."""
+    machine = weighed(pf.load(name))
+    if what == "points":
+        machine = machine.with_masses([dataclasses.replace(each, inertia=None) for each in machine.masses])
+    elif what != "solids":
+        machine = weighed(machine, own={machine.end_effector_body: 1.0})
+    text = to_mjcf(machine, gravity=(0.0, 0.0, -9.81))
+    assert ("made up" in text) == (what != "solids") and "damping" not in text
+    model = Model.of(text)
+    mujoco.mj_resetDataKeyframe(model.model, model.data, 0)
+    for _ in range(300):
+        mujoco.mj_step(model.model, model.data)
+        assert np.abs(model.rows()[0]).max() <= 1e-2 * machine.characteristic_length * metres(machine)
+    assert not any(model.data.warning[kind].number for kind in range(len(model.data.warning)))
+
+
+def test_what_weighs_nothing_weighs_nothing_again_when_it_is_read_back() -> None:
+    machine = weighed(pf.load("five_bar"), own={pf.load("five_bar").end_effector_body: 1.0})
+    masses = {each.body: each.mass for each in read_back(machine).masses}
+    assert masses == {each.body: each.mass for each in machine.masses if each.body != machine.base}
 
 
 def with_rates(mechanism: pf.Mechanism) -> pf.Mechanism:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from pfabrik.cli import main
 from pfabrik.errors import InvalidArgument
 from pfabrik.machine.description.body_inertias import inertias_of
 from pfabrik.machine.files import dumps, loads
-from test_dynamics import weighed
+from test_dynamics import by_mujoco, weighed
 
 DESCRIBED = """
 [[body]]
@@ -354,3 +355,33 @@ def test_bodies_of_geoms_weigh_what_mujoco_says(compiler: str, seen: str, known:
         np.testing.assert_allclose(found, turn @ np.diag(model.body_inertia[index]) @ turn.T, atol=1e-9 * mass.mass)
     told = any("masses that follow from meshes" in str(note) for note in read.notes)
     assert told == (known in ("bc", ""))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_hangs_on_a_machine_by_joints_that_are_left_out_weighs_on_it(seed: int) -> None:
+    """As in MuJoCo where it is welded on: a finger of the hand, and a pair of links that hang on the arm."""
+    pytest.importorskip("mujoco")
+    random = np.random.default_rng(seed)
+
+    def body(name: str, joint: str, inner: str = "") -> str:
+        place, turn = 0.2 * random.standard_normal(3), random.standard_normal(4)
+        at, centre, quat = (" ".join(map(repr, each.tolist())) for each in (place, place[::-1], turn))
+        inertial = f'<inertial mass="{random.uniform(0.5, 2.0)!r}" pos="{centre}" diaginertia="0.01 0.02 0.025"/>'
+        return f'<body name="{name}" pos="{at}" quat="{quat}">{joint}{inertial}{inner}</body>'
+
+    hinge = '<joint name="{}" axis="1 2 3"/>'
+    finger = body("finger", '<joint name="grip" type="slide"/>')
+    links = body("hung", '<joint name="swing"/>', body("low", '<joint name="twist" type="ball"/>'))
+    arm = body("arm", hinge.format("j"), body("hand", hinge.format("k"), finger) + links)
+    motors = '<actuator><motor joint="j"/><motor joint="k"/></actuator>'
+    text = f'<mujoco><option gravity="1 -2 -9"/><worldbody>{arm}</worldbody>{motors}</mujoco>'
+    found = pf.interop.from_mjcf(text, end_effector="hand")
+    assert "their masses go with what they hang on: " in str(found)
+    values, rates, gains = random.standard_normal((3, 2))
+    solution = pf.solve_fk(found.mechanism, values)
+    welded = re.sub('<joint name="(grip|swing|twist)"[^>]*>', "", text)
+    forces, mass = by_mujoco(welded, values, rates, gains)
+    motion: dict[str, Any] = {"twists": rates, "accelerations": gains, "gravity": (1.0, -2.0, -9.0)}
+    efforts = pf.inverse_dynamics(solution, at="actuators", **motion).actuators
+    np.testing.assert_allclose(efforts, forces, atol=1e-9 * np.abs(forces).max())
+    np.testing.assert_allclose(pf.mass_matrix(solution, "actuators"), mass, atol=1e-9 * np.abs(mass).max())

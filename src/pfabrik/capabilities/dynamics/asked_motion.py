@@ -43,7 +43,7 @@ def asked_motion(motion: Any, twists: ArrayLike | None, accelerations: ArrayLike
     """Configurations and how they move, of the arguments of `inverse_dynamics`."""
     require_choice("at", at, ("task", "actuators"))
     is_given = twists is not None or accelerations is not None
-    if isinstance(motion, TimedMotion):
+    if not isinstance(motion, Solution) and isinstance(motion, TimedMotion):
         if is_given:
             raise InvalidArgument("twists", "twists beside a path with times", "none: the path says how it moves")
         return MovingRows(motion.solution, "actuators", motion.rates, motion.accelerations, motion.times)

@@ -34,8 +34,7 @@ class Drives:
         self.lengths = actuator_units(mechanism)
         self.units = np.where(is_length, mechanism.characteristic_length, 1.0 / metres)
         self.limits = np.array([drive.said("max_torque") or np.inf for drive in mechanism.drives])
-        rotors = [(drive.said("rotor_inertia") or 0.0) * (drive.said("gear") or 1.0) ** 2 for drive in mechanism.drives]
-        self.inertia = np.array(rotors)
+        self.inertia = np.array([drive.armature or 0.0 for drive in mechanism.drives])
         self.friction = np.array([drive.said("friction") or (0.0, 0.0) for drive in mechanism.drives])
 
     def signs(self, rates: Floats) -> Floats:

@@ -23,6 +23,7 @@ from .weights import weights_of
 
 LEFT_FREE = "the loads move a part without inertia that neither the end effector nor an actuator holds"
 NEVER_MADE = "the machine cannot move so here: its task leaves that motion out, or it is at a serial singularity"
+TOO_LARGE = "its numbers are too large: forces overflow"
 
 
 def inverse_dynamics(
@@ -91,6 +92,7 @@ def inverse_dynamics(
         limits = drives.limits * drives.units
         least, both = exerted[over] * drives.units, np.stack([-limits, limits], axis=1)
         exerted[over] = within_limits(least, found.motions[over], both)[0] / drives.units
+    add_reason(reasons, ~np.isfinite(exerted).all(axis=1), TOO_LARGE)
     for each in (exerted, found.rates, found.gains, found.signs):
         each[has_reason(reasons)] = np.nan
     exerted, rates, gains = (shaped(each, shape) for each in (exerted, found.rates, found.gains))

@@ -11,6 +11,7 @@ import numpy as np
 from ...answers.solution import Solution
 from ...common.arrays import Floats, Mask
 from ...common.batch import take
+from ...common.derived import derived
 from ...kernels.dynamics.inverse_dynamics import inverse_dynamics
 from ...kernels.dynamics.moving import Exerted, MovingMachine, new_exerted, new_moving_scratch
 from ...kernels.handle import Handle, Scratch
@@ -21,7 +22,7 @@ from ...machine.files.units import metres_of
 from ...tolerances import TOLERANCES
 from ..statics.transmission import is_redundantly_actuated, twist_units
 from .drives import drives_of
-from .weights import Weights
+from .weights import Weights, own_weights
 
 ROWS_A_BLOCK = 64
 
@@ -70,9 +71,12 @@ class MovingRows:
         requests : of "wrenches", "resting", "matrices", "twists", "motions", with `probes` "probes" too.
         """
         mechanism, q = self.solution.mechanism, self.solution._coordinates
-        moving = moving_of(mechanism, self.at, self.weights, self.gravity, probes or Probes())
+        if probes is None and self.weights is own_weights(mechanism):
+            machine, scratch, k = _prepared(mechanism, self.at, tuple(self.gravity.tolist()))
+        else:
+            machine, scratch, k = _prepare(mechanism, self.at, self.weights, self.gravity, probes or Probes())
+        moving, units = machine.record, in_lengths(mechanism, self.at)
         axes, n = axes_of(mechanism, self.at, self.solution._rows.poses), len(q)
-        units, k = in_lengths(mechanism, self.at), axes.shape[1] + len(moving.asked)
         rates, gains = (
             np.zeros((n, len(units))) if x is None else x[:, : len(units)] / units for x in (self.rates, self.gains)
         )
@@ -80,7 +84,6 @@ class MovingRows:
             rates, gains = ((axes[..., : len(units)] @ x[..., None])[..., 0].copy() for x in (rates, gains))
         found, drives = new_exerted(moving, n, k, requests), actuator_units(mechanism)
         still = np.zeros((0, len(drives))) if self.still is None else self.still / drives
-        machine, scratch = Handle(moving), Scratch(new_moving_scratch, moving, k)
         coordinates = q / rate_units(mechanism)
 
         def run(block: slice) -> None:
@@ -92,6 +95,26 @@ class MovingRows:
         length = mechanism.characteristic_length
         scale = length**2 * metres_of(mechanism.length_unit)
         return found._replace(rates=found.rates * drives, gains=found.gains * drives, wrenches=found.wrenches * scale)
+
+
+class Prepared(NamedTuple):
+    """What the kernel reads and writes, and how many components its rates have."""
+
+    machine: Handle[MovingMachine]
+    scratch: Scratch[Any]
+    components: int
+
+
+@derived
+def _prepared(mechanism: Mechanism, at: At, gravity: tuple[float, ...]) -> Prepared:
+    """That of a machine that carries nothing."""
+    return _prepare(mechanism, at, own_weights(mechanism), np.array(gravity), Probes())
+
+
+def _prepare(mechanism: Mechanism, at: At, weights: Weights, gravity: Floats, probes: Probes) -> Prepared:
+    moving = moving_of(mechanism, at, weights, gravity, probes)
+    k = axes_of(mechanism, at, np.eye(4)[None]).shape[1] + len(moving.asked)
+    return Prepared(Handle(moving), Scratch(new_moving_scratch, moving, k), k)
 
 
 def axes_of(mechanism: Mechanism, at: At, poses: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from ...errors import InvalidArgument
 from ...kinematics import BodyInertia, inertias_of, tree_of
 from ...machine.description.mechanism import Mechanism
 from ...machine.files.units import metres_of
-from ..statics.loads import checked_loads
+from ..statics.loads import Load, checked_loads
 
 
 class Weights(NamedTuple):
@@ -42,11 +43,23 @@ def weights_of(mechanism: Mechanism, loads: Any = None) -> Weights:
     ------
     InvalidArgument or UnknownName : bodies that move without a mass; loads that are none.
     """
+    if loads is None:
+        return own_weights(mechanism)
+    return _weights(mechanism, checked_loads(mechanism, loads))
+
+
+@derived
+def own_weights(mechanism: Mechanism) -> Weights:
+    """All masses of a machine that carries nothing."""
+    return _weights(mechanism, [])
+
+
+def _weights(mechanism: Mechanism, given: Sequence[Load]) -> Weights:
     lacking = lacking_masses(mechanism)
     if lacking:
         expected = "a mass of each body that moves: `with_masses`, or in its file, and 0 where it weighs nothing"
         raise InvalidArgument("mechanism", f"no mass of {', '.join(lacking)}", expected)
-    known, given = inertias_of(mechanism, metres_of(mechanism.length_unit)), checked_loads(mechanism, loads)
+    known = inertias_of(mechanism, metres_of(mechanism.length_unit))
     parts = [(body, known[body]) for body in moving_bodies(mechanism)]
     parts += [(each.body, BodyInertia(each.mass, each.point, np.zeros((3, 3)))) for each in given if each.mass]
     acting = [each for each in given if each.wrench.any()]

@@ -64,6 +64,8 @@ def no_reasons(rows: int) -> Reasons:
 def add_reason(reasons: Reasons, rows: Any, reason: str | Reasons) -> None:
     """Give some rows this reason, or each its own, by indices or a mask, unless they have one."""
     places = np.arange(len(reasons))[rows]
+    if not len(places):
+        return
     is_open = ~has_reason(reasons[places])
     reasons[places[is_open]] = reason if isinstance(reason, str) else reason[is_open]
 

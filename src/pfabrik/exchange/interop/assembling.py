@@ -26,7 +26,7 @@ from .closed_home import ClosedHome, close_home
 from .closing import CLOSED, OpenLoops
 from .collision import Collision
 from .digits import worst
-from .imported_masses import with_masses
+from .imported_masses import heavy_bodies, with_masses
 from .imported_shapes import with_collision
 from .notes import Note, note_names, noting
 from .opened import OpenMechanism
@@ -115,11 +115,14 @@ def closed(opened: OpenMechanism, notes: list[Note]) -> Assembled:
     slack = max(home.gap, CLOSED) if gap > CLOSED else 0.0
     rigid, stands_for = merged_bodies(merged_balls(structure.joints), opened.base, opened.end_effector)
     exact = straighten(rigid, opened, reference, slack, notes)
-    simple = combined(exact, {opened.base, opened.end_effector}, notes)
+    collision = _moved_collision(opened, loops.tree, home).merged(stands_for)
+    kept = {opened.base, opened.end_effector} | heavy_bodies(collision.masses)
+    simple, within = combined(exact, kept, notes)
+    masses = [dataclasses.replace(each, body=within.get(each.body, each.body)) for each in collision.masses]
     moving = unlocked(simple, opened, reference, slack, notes)
     limited = [short_joint(_told(joint, opened), loops.length) for joint in moving]
     reference = None if reference is None else shortened(reference, loops.length)
-    collision = _moved_collision(opened, loops.tree, home).merged(stands_for)
+    collision = dataclasses.replace(collision, masses=tuple(masses))
     return Assembled(_mechanism(opened, limited, reference, notes), gap * loops.length, collision)
 
 

@@ -15,6 +15,10 @@ from ...machine.description.whole_rules import is_impossible
 from .notes import Note, note_names
 from .short_numbers import shortened
 
+NEGLIGIBLE = 1e-6
+"""Share of a machine's mass up to which a body between two hinges that cross is no body of its own: what a file has for
+nothing is 1e-9 kg or so, and a cross weighs 1e-4 and more."""
+
 
 def placed_mass(body: str, mass: float, frame: Floats, inertia: Floats) -> Mass:
     """The mass of a body whose centre, and the axes of whose inertia (3, 3), are a frame (4, 4)."""
@@ -37,6 +41,14 @@ def mass_in_unit(mass: Mass, metres: float) -> Mass:
     return Mass(mass.body, mass.mass, np.divide(mass.centre, metres), np.divide(mass.inertia, metres**2))
 
 
+def heavy_bodies(masses: Iterable[Mass]) -> set[str]:
+    """The bodies that weigh more than next to nothing."""
+    whole: dict[str, float] = defaultdict(float)
+    for each in masses:
+        whole[each.body] += each.mass
+    return {body for body, mass in whole.items() if mass > NEGLIGIBLE * sum(whole.values())}
+
+
 def with_masses(mechanism: Mechanism, masses: Iterable[Mass], known: Collection[str], notes: list[Note]) -> Mechanism:
     """With the masses of bodies that were merged as one; 0 for bodies that the file does not know.
 
@@ -49,8 +61,6 @@ def with_masses(mechanism: Mechanism, masses: Iterable[Mass], known: Collection[
         parts[mass.body].append(mass)
     if not parts:
         return mechanism
-    lost = [body for body, own in parts.items() if body not in mechanism.bodies and any(each.mass for each in own)]
-    note_names(notes, "masses of bodies within a joint are left out, of", lost)
     strange, found = [], []
     for body in mechanism.bodies:
         own = [each for each in parts.get(body, []) if each.centre is not None and each.mass > 0.0]

@@ -41,6 +41,12 @@ DOUBLED = 0.1
 THINNEST = 0.1
 """Least radius of gyration of a body [L]: a light body that turns easily would need shorter steps."""
 
+WEIGHTLESS = 1e-3
+"""Mass of a body that weighs nothing, over that of the heaviest: a model with less than that blows up."""
+
+POINT = 1e-5
+"""Radius of gyration of a point and about the line of a rod [L]: MuJoCo turns nothing without, and none sees it."""
+
 SERVO_RATE = 120.0
 """Natural frequency of the servos [1/s] where they carry all of the machine: an eighth of what one step of the
 simulation can follow. A platform that its legs hold by short levers settles tens of times more slowly."""
@@ -56,14 +62,18 @@ class Physics:
     Attributes
     ----------
     masses : body -> its mass [kg].
-    given : bodies whose masses the caller gave, or the mechanism has.
+    made_up : moving bodies whose masses neither the caller gave nor the mechanism has.
+    weightless : those that weigh nothing in the mechanism.
+    is_solid : True if all of them have mass, and moments of inertia about every axis, in the mechanism.
     known : what bodies weigh of which the mechanism has it, lengths in its unit.
     length : the characteristic length [m].
     heaviest : the largest of the masses, which any servo can carry [kg].
     """
 
     masses: Mapping[str, float]
-    given: frozenset[str]
+    made_up: tuple[str, ...]
+    weightless: tuple[str, ...]
+    is_solid: bool
     known: Mapping[str, BodyInertia]
     length: float
     heaviest: float
@@ -79,21 +89,37 @@ class Physics:
             return BodyInertia(mass, points.mean(axis=0), ball)
         _, centre, inertia = self.known[body]
         is_solid = np.linalg.eigvalsh(inertia)[0] > 0.0
-        return BodyInertia(mass, centre * metres, inertia * metres**2 if is_solid else ball)
+        least = 0.0 if is_solid else mass * (POINT * self.length) ** 2
+        return BodyInertia(mass, centre * metres, inertia * metres**2 + least * np.eye(3))
 
     def carried(self, turning: bool) -> float:
         """The load of a servo: a moment of inertia [kg m²] if it turns, else a mass [kg]."""
         return self.heaviest * self.length**2 if turning else self.heaviest
 
-    def servo(self, turning: bool) -> dict[str, float]:
+    def servo(self, drive: JointCoordinate) -> dict[str, float]:
         """Gains of a critically damped position servo, per radian or metre."""
-        carried = self.carried(turning)
+        carried = self.carried(drive.kind == "angle") + (drive.armature or 0.0)
         return {"kp": carried * SERVO_RATE**2, "kv": 2.0 * carried * SERVO_RATE}
 
-    def joint(self, turning: bool, actuated: bool) -> dict[str, float]:
-        """Armature and damping: stiff servos on light bodies without an armature blow up."""
+    def joint(self, turning: bool, drive: JointCoordinate | None = None) -> dict[str, float]:
+        """Armature and friction: those that the mechanism has, else made up if masses are.
+
+        An armature is made up as well where a driven body may be a point or weigh nothing: a stiff servo on a light
+        body blows up without.
+
+        Parameters
+        ----------
+        drive : the coordinate, if it is driven: a passive one has neither in the mechanism.
+        """
         carried = self.carried(turning)
-        return {"armature": (0.2 if actuated else 0.01) * carried, "damping": 0.02 * carried}
+        made_up = carried if self.made_up else 0.0
+        armature, friction = 0.01 * made_up, (0.0, 0.02 * made_up)
+        if drive is not None:
+            unsaid = 0.0 if self.is_solid else 0.2 * carried
+            armature = unsaid if drive.armature is None else drive.armature
+            friction = drive.said("friction") or friction
+        said = {"armature": armature, "frictionloss": friction[0], "damping": friction[1]}
+        return {name: value for name, value in said.items() if value}
 
 
 def physics(mechanism: Mechanism, metres: float, masses: Mapping[str, float] | None) -> Physics:
@@ -118,10 +144,17 @@ def physics(mechanism: Mechanism, metres: float, masses: Mapping[str, float] | N
     whole = DENSITY * length**3
     plausible = {body: whole if body == mechanism.end_effector_body else LINK * whole for body in mechanism.bodies}
     weighed = inertias_of(mechanism, metres)
-    known = {body: each for body, each in weighed.items() if body not in given and each.mass > 0.0}
-    every = plausible | {body: each.mass for body, each in known.items()} | given
-    moving = [mass for body, mass in every.items() if body != mechanism.base]
-    return Physics(every, frozenset(given) | known.keys(), known, length, max(moving))
+    moving = [body for body in mechanism.bodies if body != mechanism.base]
+    said = {body: each for body, each in weighed.items() if body not in given}
+    known = {body: each for body, each in said.items() if each.mass > 0.0}
+    weightless = tuple(body for body in moving if body in said and body not in known)
+    every = plausible | dict.fromkeys(weightless, 0.0) | {body: each.mass for body, each in known.items()} | given
+    heaviest = max(every[body] for body in moving) or whole
+    every |= dict.fromkeys(weightless, WEIGHTLESS * heaviest)
+    made_up = tuple(body for body in moving if body not in said and body not in given)
+    has_points = any(np.linalg.eigvalsh(known[body].inertia)[0] <= 0.0 for body in moving if body in known)
+    is_solid = not (made_up or weightless or has_points)
+    return Physics(every, made_up, weightless, is_solid, known, length, heaviest)
 
 
 SLIDING = ("prismatic", "cylindrical")
@@ -269,10 +302,9 @@ def bodies(mechanism: Mechanism, tree: CutTree, names: Names, metres: float, phy
         elements[branch.body], origins[branch.body] = body, origin
         for attributes in _joints(mechanism, branch, metres, physics):
             ET.SubElement(body, "joint", attributes)
-        weighed, doubles = branch.double_of or branch.body, Counter(each.double_of for each in tree.branches)
-        share = DOUBLED if branch.double_of else 1.0 - DOUBLED * doubles[branch.body]
+        weighed = branch.double_of or branch.body
         inertia = physics.inertia(weighed, np.array(points[weighed]), metres)
-        body.append(_inertial(inertia, share, origin))
+        body.append(_inertial(inertia, share_of(branch.body, tree), origin))
     for name in mechanism.bodies:
         elements[name].extend(_drawn(points[name], origins[name], physics))
         elements[name].extend(_thick(mechanism, name, origins[name], metres))
@@ -284,6 +316,13 @@ def bodies(mechanism: Mechanism, tree: CutTree, names: Names, metres: float, phy
         place = number_text(point - origins[body_name])
         ET.SubElement(elements[body_name], "site", name=site, pos=place, size=repr(2.0 * THICKNESS * physics.length))
     return world
+
+
+def share_of(body: str, tree: CutTree) -> float:
+    """The share that a body of the tree has of its mass: its doubles have the rest, and they theirs."""
+    doubles = Counter(branch.double_of for branch in tree.branches)
+    is_double = any(branch.body == body and branch.double_of for branch in tree.branches)
+    return DOUBLED if is_double else 1.0 - DOUBLED * doubles[body]
 
 
 def _points(mechanism: Mechanism, metres: float) -> Mapping[str, list[Floats]]:
@@ -313,7 +352,7 @@ def _joints(mechanism: Mechanism, branch: Branch, metres: float, physics: Physic
     """Attributes of the joints that a body hangs on, from its parent outward: one for each coordinate, or a ball."""
     joint = branch.joint
     if joint.type == "spherical":
-        yield {"name": joint.name, "type": "ball"} | as_attributes(physics.joint(True, False))
+        yield {"name": joint.name, "type": "ball"} | as_attributes(physics.joint(True))
         return
     coordinates = mechanism.coordinates[columns(mechanism)[joint.name]]
     for each in coordinates if branch.forward else reversed(coordinates):
@@ -327,7 +366,7 @@ def _joints(mechanism: Mechanism, branch: Branch, metres: float, physics: Physic
             attributes["ref"] = repr(each.home * unit)
         if joint.range is not None:
             attributes["range"] = number_text(np.array(each.limits) * unit)
-        yield attributes | as_attributes(physics.joint(turning, each.place in joint.driven))
+        yield attributes | as_attributes(physics.joint(turning, each if each.place in joint.driven else None))
 
 
 def axes_of(mechanism: Mechanism, joint: Joint) -> Floats:

@@ -27,7 +27,7 @@ from .mjcf_masses import read_masses
 from .mjcf_model import MjcfModel
 from .mjcf_plain import plain_model, straight_tendons, target_of, transmission_text
 from .mjcf_tendons import tendon_legs
-from .mjcf_writing import MADE_UP, NOTE
+from .mjcf_writing import MADE_UP, NOTE, WEIGHTLESS_BODIES
 from .notes import Note, note_names, noting
 from .opened import loops_by_name
 from .robots import ImportOptions, Robot, mechanism_of
@@ -161,13 +161,19 @@ def _collision(root: ET.Element, model: MjcfModel, data: dict[str, str], notes: 
 
 
 def _weighed(masses: Iterable[Mass], data: dict[str, str]) -> tuple[Mass, ...]:
-    """The masses but those that `to_mjcf` made up."""
-    text = data.get(MADE_UP, "[]")
+    """The masses but those that `to_mjcf` made up; 0 of bodies that weigh nothing but in MuJoCo."""
+    made_up, weightless = (_names_in(data, key) for key in (MADE_UP, WEIGHTLESS_BODIES))
+    kept = (each for each in masses if each.body not in made_up)
+    return tuple(Mass(each.body, 0.0) if each.body in weightless else each for each in kept)
+
+
+def _names_in(data: dict[str, str], key: str) -> tuple[str, ...]:
+    """The names of bodies in a custom element."""
+    text = data.get(key, "[]")
     try:
-        made_up = require_names(MADE_UP, json.loads(text))
+        return tuple(require_names(key, json.loads(text)))
     except ValueError:
-        raise fault(f"custom text '{MADE_UP}'", shown(text), '["body", ...]') from None
-    return tuple(each for each in masses if each.body not in made_up)
+        raise fault(f"custom text '{key}'", shown(text), '["body", ...]') from None
 
 
 def _clearance(text: str | None) -> float | None:

@@ -17,7 +17,18 @@ from ...machine.description.joints import DRIVE_FIELDS
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.files.units import MEASURED, metres_of
 from .cuts import CutTree, cut_tree
-from .mjcf_bodies import STEP, Names, Physics, as_attributes, bodies, names_of, physics, si_unit, strut_notes
+from .mjcf_bodies import (
+    STEP,
+    WEIGHTLESS,
+    Names,
+    Physics,
+    as_attributes,
+    bodies,
+    names_of,
+    physics,
+    si_unit,
+    strut_notes,
+)
 from .xml_reading import number_text
 
 NOTE = "pfabrik."
@@ -25,6 +36,9 @@ NOTE = "pfabrik."
 
 MADE_UP = "made_up"
 """The custom element with the names of the bodies whose masses are made up: they are not read back."""
+
+WEIGHTLESS_BODIES = "weightless"
+"""The custom element with the names of the bodies that weigh nothing: they do again when they are read back."""
 
 CLOSING_TIME = 2.5 * STEP
 """Time constant by which equalities close what opens [s]: MuJoCo asks for two steps at least."""
@@ -45,7 +59,10 @@ def to_mjcf(
     have position servos; there is a keyframe `home`. Shapes of bodies are geoms of group 3 that touch nothing, and
     weigh nothing; a strut is two, of which one goes with each part, where these are as long as it is over all of its
     range. Pairs of `ignore` are `exclude`. Cones, which MuJoCo does not know, are in comments and in custom elements,
-    as are base, end effector and task, what drives can do, struts, and the clearance.
+    as are base, end effector and task, what drives can do, struts, and the clearance. Of drives, armature (the inertia
+    of a rotor by the square of its gear), friction, and the most that they exert are those of the mechanism; where it
+    lacks the mass of a body, what it does not say of them is made up, for servos to be stable, and comments say so;
+    armature also where a body is a point or weighs nothing.
 
     Parameters
     ----------
@@ -55,7 +72,8 @@ def to_mjcf(
         The file to write; None writes none.
     masses : mapping of str to float, optional
         Body -> its mass [kg]. Others are those of the mechanism, or made up, in proportion to it: what the model
-        weighs, and so every force in it, means nothing until they are given. A point mass becomes a ball.
+        weighs, and so every force in it, means nothing until they are given. What weighs nothing has a thousandth of
+        the heaviest, and a point the least inertia that MuJoCo can turn.
     gravity : array (3,), optional
         Gravity [m/s²]; none by default, for with masses made up, its forces would be too.
 
@@ -91,10 +109,10 @@ def _text(mechanism: Mechanism, metres: float, physics: Physics, gravity: Floats
         root, "option", timestep=repr(STEP), integrator="implicitfast", tolerance="1e-12", gravity=number_text(gravity)
     )
     custom = ET.SubElement(root, "custom")
-    made_up = made_up_of(mechanism, physics)
-    made_up += [branch.body for branch in tree.branches if branch.double_of in made_up]
-    if made_up:
-        ET.SubElement(custom, "text", name=NOTE + MADE_UP, data=json.dumps(made_up))
+    for name, named in ((MADE_UP, physics.made_up), (WEIGHTLESS_BODIES, physics.weightless)):
+        bodies_named = [*named, *(branch.body for branch in tree.branches if branch.double_of in named)]
+        if bodies_named:
+            ET.SubElement(custom, "text", name=NOTE + name, data=json.dumps(bodies_named))
     for name, text in _notes(mechanism, names, metres):
         ET.SubElement(custom, "text", name=NOTE + name, data=text)
     root.append(bodies(mechanism, tree, names, metres, physics))
@@ -113,17 +131,20 @@ def _text(mechanism: Mechanism, metres: float, physics: Physics, gravity: Floats
 def _comments(mechanism: Mechanism, physics: Physics) -> Iterator[str]:
     """Yield the comments for who reads the file."""
     yield f"'{mechanism.name}', written by pfabrik: lengths in m, where its own file has {mechanism.length_unit}"
-    if made_up := made_up_of(mechanism, physics):
-        yield f"masses are made up, in proportion to the machine, of {', '.join(made_up)}"
+    if physics.made_up:
+        yield f"masses are made up, in proportion to the machine, of {', '.join(physics.made_up)}"
+        yield "armature and damping of passive joints are made up"
+        if unbraked := [drive.name for drive in mechanism.drives if drive.said("friction") is None]:
+            yield f"damping is made up of {', '.join(unbraked)}"
+    unsaid = [drive.name for drive in mechanism.drives if drive.armature is None]
+    if unsaid and not physics.is_solid:
+        yield f"armature is made up of {', '.join(unsaid)}"
+    if physics.weightless:
+        yield f"bodies that weigh nothing have {WEIGHTLESS:g} of the heaviest: {', '.join(physics.weightless)}"
     for joint in mechanism.joints:
         if joint.cone is not None:
             half_angle = f"{np.degrees(joint.cone.half_angle):.6g} deg"
             yield f"a limit that MuJoCo does not keep: the cone of {joint.name}, {half_angle} about {joint.cone.axis}"
-
-
-def made_up_of(mechanism: Mechanism, physics: Physics) -> list[str]:
-    """The bodies whose masses are made up."""
-    return [body for body in mechanism.bodies if body not in physics.given and body != mechanism.base]
 
 
 def _notes(mechanism: Mechanism, names: Names, metres: float) -> Iterator[tuple[str, str]]:
@@ -165,8 +186,10 @@ def _servos(mechanism: Mechanism, metres: float, physics: Physics) -> ET.Element
     """A position servo for every actuated coordinate."""
     actuator = ET.Element("actuator")
     for drive in mechanism.drives:
-        gains = as_attributes(physics.servo(drive.kind == "angle"))
+        gains = as_attributes(physics.servo(drive))
         servo = ET.SubElement(actuator, "position", {"name": drive.name, "joint": drive.name, **gains})
         if np.isfinite(drive.limits).all():
             servo.set("ctrlrange", number_text(np.array(drive.limits) * si_unit(drive, metres)))
+        if (most := drive.said("max_torque")) is not None:
+            servo.set("forcerange", number_text(np.array([-most, most])))
     return actuator

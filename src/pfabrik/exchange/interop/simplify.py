@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,10 @@ SKEW = 0.1
 
 
 def prune(opened: OpenMechanism, notes: list[Note]) -> OpenMechanism:
-    """The machine with only those joints and loops on which the end effector's motion against the base depends."""
+    """The machine with only those joints and loops on which the end effector's motion against the base depends.
+
+    What hangs on one of its bodies by the others is held where it is: its mass is of that body.
+    """
     edges = edges_between(opened.joints, opened.loops)
     tips = [edge for edge in edges if edge.joint.name == opened.end_effector]
     body = tips[0].bodies[0] if tips else opened.end_effector
@@ -35,7 +38,19 @@ def prune(opened: OpenMechanism, notes: list[Note]) -> OpenMechanism:
     note_names(notes, "left out, for the end effector does not depend on them", omitted)
     joints = tuple(joint for joint in opened.joints if joint.name in names)
     loops = tuple(loop for loop in opened.loops if loop.name in names)
-    return dataclasses.replace(opened, joints=joints, loops=loops)
+    pruned = dataclasses.replace(opened, joints=joints, loops=loops)
+    return _carrying(pruned, [edge.joint for edge in edges if edge.joint.name in omitted], notes)
+
+
+def _carrying(opened: OpenMechanism, omitted: Sequence[Joint], notes: list[Note]) -> OpenMechanism:
+    """The machine with the masses of bodies that hang on its own by joints that are left out."""
+    bodies = dict.fromkeys(body for edge in edges_between(opened.joints, opened.loops) for body in edge.bodies)
+    hung = welded(omitted, opened.base, *bodies)
+    carried = {each.body: None for each in opened.collision.masses if each.mass > 0.0 and each.body in hung}
+    names = [body for body in carried if hung[body] != opened.base and hung[body] in bodies]
+    note_names(notes, "held where they are, their masses go with what they hang on", names)
+    masses = [dataclasses.replace(each, body=hung.get(each.body, each.body)) for each in opened.collision.masses]
+    return dataclasses.replace(opened, collision=dataclasses.replace(opened.collision, masses=tuple(masses)))
 
 
 def edges_between(joints: Sequence[Joint], loops: Sequence[Loop]) -> list[Edge]:
@@ -94,29 +109,35 @@ def merged_balls(joints: Sequence[Joint]) -> list[Joint]:
     return [joint for joint in replaced if joint is not None]
 
 
-def combined(joints: Sequence[Joint], kept: set[str], notes: list[Note]) -> list[Joint]:
+def combined(joints: Sequence[Joint], kept: Collection[str], notes: list[Note]) -> tuple[list[Joint], dict[str, str]]:
     """Two joints with nothing else on the body between them as one joint, unless that body is to be kept.
 
     Two passive hinges whose axes cross are a universal joint. J[0] and J[1], a hinge and a slide along it, are a
     cylindrical joint J: as this library writes it.
+
+    Returns
+    -------
+    tuple : the joints; and body that is within one of them -> the body behind it.
     """
     on_body: dict[str, list[Joint]] = defaultdict(list)
     for joint in joints:
         for body in joint.connects:
             on_body[body].append(joint)
     made = {joint.name: joint for joint in joints}
-    crossing = []
+    crossing: list[str] = []
+    within: dict[str, str] = {}
     for between, pair in on_body.items():
         if len(pair) != 2 or between in kept or not all(made.get(joint.name) is joint for joint in pair):
             continue
         first, second = sorted(pair, key=lambda joint: joint.name.endswith("[1]"))
         one = _combination(first, second, between)
         if one is not None:
+            within[between] = one.connects[1]
             made = {name: one if each is first else each for name, each in made.items() if each is not second}
             if one.name not in (_stem(first), _stem(second)):
                 crossing.append(one.name)
     note_names(notes, "hinges whose axes cross are a universal joint", crossing)
-    return list(made.values())
+    return list(made.values()), within
 
 
 def _combination(first: Joint, second: Joint, between: str) -> Joint | None:

@@ -14,6 +14,9 @@ from ...machine.description.mechanism import Mechanism
 from .mjcf_bodies import axes_of, si_unit
 from .xml_reading import number_text
 
+DRAKE = "drake"
+"""Prefix of what Drake's dialect adds to URDF: highest accelerations, rotors and gears."""
+
 
 class UrdfTree:
     """The elements of a description, as they are added.
@@ -26,7 +29,7 @@ class UrdfTree:
 
     def __init__(self, mechanism: Mechanism, metres: float) -> None:
         self.mechanism, self.metres = mechanism, metres
-        self.root = ET.Element("robot", name=mechanism.name)
+        self.root = ET.Element("robot", {"name": mechanism.name, f"xmlns:{DRAKE}": "http://drake.mit.edu"})
         self.origins: dict[str, Floats] = {}
 
     def remark(self, text: str) -> None:
@@ -65,12 +68,18 @@ class UrdfTree:
         ET.SubElement(element, "axis", xyz=number_text(axis))
         if not from_home:
             _put_back(element, coordinate, axis, coordinate.home * unit)
-        limit = {"effort": "0"}
+        most, rate, gain = (coordinate.said(key) for key in ("max_torque", "max_speed", "max_acceleration"))
+        limit = {"effort": repr(float(most or 0.0))}
         if joint.range is not None:
             lower, upper = (np.array(coordinate.limits) - (coordinate.home if from_home else 0.0)) * unit
             limit |= {"lower": repr(float(lower)), "upper": repr(float(upper))}
-        limit["velocity"] = repr(float((coordinate.said("max_speed") or 0.0) * unit))
+        limit["velocity"] = repr(float((rate or 0.0) * unit))
+        if gain is not None:
+            limit[f"{DRAKE}:acceleration"] = repr(float(gain * unit))
         ET.SubElement(element, "limit", limit)
+        if (friction := coordinate.said("friction")) is not None:
+            dry, viscous = map(repr, friction)
+            ET.SubElement(element, "dynamics", damping=viscous, friction=dry)
 
 
 def _put_back(element: ET.Element, coordinate: JointCoordinate, axis: Floats, home: float) -> None:
@@ -95,5 +104,8 @@ def left_out(mechanism: Mechanism) -> Iterator[str]:
     for joint in mechanism.joints:
         if joint.cone is not None:
             yield f"a limit that URDF has no word for: the cone of {joint.name}"
+    for word, key in (("effort", "max_torque"), ("velocity", "max_speed")):
+        if unsaid := [drive.name for drive in mechanism.drives if drive.said(key) is None]:
+            yield f"{word} is 0, which stands for no limit that is known, of {', '.join(unsaid)}"
     if mechanism.shapes or mechanism.clearance is not None:
         yield "shapes of bodies and their clearance are left out"

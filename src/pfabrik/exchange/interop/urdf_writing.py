@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import numpy as np
 
@@ -14,12 +15,17 @@ from ...common.arrays import Floats
 from ...common.whole_files import whole_path
 from ...errors import InvalidArgument
 from ...kinematics import columns
+from ...machine.description.body_inertias import inertias_of
+from ...machine.description.body_masses import as_moments
 from ...machine.description.joint_coordinates import JointCoordinate
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.files.units import metres_of
-from .cuts import Branch, cut_tree
+from .cuts import Branch, CutTree, cut_tree
+from .mjcf_bodies import share_of
 from .names import unique
-from .urdf_tree import UrdfTree, kind_of_joint, left_out
+from .urdf_collision import MOMENTS
+from .urdf_tree import DRAKE, UrdfTree, kind_of_joint, left_out
+from .xml_reading import number_text
 
 Table = dict[str, Any]
 
@@ -31,8 +37,11 @@ def to_urdf(
 
     Zero is home, closed, for URDF has no word for another; frames are parallel to the base's there, that of the end
     effector is at the reference point. Balls of the tree are `floating` in the description and SPHERICAL in the file of
-    loops; loops meet in links `closing_<joint>_1` and `closing_<joint>_2`. Cones, tasks, highest accelerations, shapes
-    and what drives a ball are left out, as comments at the top of the file say.
+    loops; loops meet in links `closing_<joint>_1` and `closing_<joint>_2`. Masses,
+    friction, and the most that drives exert and how fast they are go out where the machine has them; highest
+    accelerations, rotors and gears in Drake's words. An effort or velocity of 0 stands for one that is not known, and a
+    body that closes a loop with a double of it leaves that a tenth of its mass. Cones, tasks, shapes and what drives a
+    ball are left out, as comments at the top of the file say.
 
     Parameters
     ----------
@@ -77,6 +86,8 @@ class _Description(UrdfTree):
         for joint in tree.cuts:
             at = np.array(mechanism.reference_point if joint.at is None else joint.at) * metres
             self._close(joint.name, joint.connects, at, is_weld=joint.type == "fixed")
+        self._weigh(tree)
+        self._add_rotors()
 
     def _add_branch(self, branch: Branch) -> None:
         """A body and the joints that it hangs on, from its parent outward."""
@@ -117,6 +128,36 @@ class _Description(UrdfTree):
             point = np.array(self.mechanism.reference_point) * self.metres
             self.join(unique(f"{body}:at", self._joint_names), "fixed", link, body, point)
 
+    def _weigh(self, tree: CutTree) -> None:
+        """Add what links weigh, of bodies whose masses are known."""
+        masses = inertias_of(self.mechanism, self.metres)
+        links = {link.get("name"): link for link in self.root.iterfind("link")}
+        bodies = [(body, body) for body in self.mechanism.bodies]
+        doubles = [(branch.body, branch.double_of) for branch in tree.branches if branch.double_of is not None]
+        for body, weighed in [*bodies, *doubles]:
+            if weighed not in masses or masses[weighed].mass == 0.0:
+                continue
+            (mass, centre, inertia), share = masses[weighed], share_of(body, tree)
+            element = ET.SubElement(links[body], "inertial")
+            ET.SubElement(element, "origin", xyz=number_text(centre * self.metres - self.origins[body]), rpy="0 0 0")
+            ET.SubElement(element, "mass", value=repr(share * mass))
+            moments = as_moments(share * inertia * self.metres**2)
+            ET.SubElement(element, "inertia", dict(zip(MOMENTS, map(repr, moments), strict=True)))
+
+    def _add_rotors(self) -> None:
+        """Add the rotors of motors, as transmissions."""
+        for drive in self.mechanism.drives:
+            rotor, gear = drive.said("rotor_inertia"), drive.said("gear")
+            if rotor is None:
+                continue
+            motor = ET.SubElement(self.root, "transmission", name=f"{drive.name}:transmission")
+            ET.SubElement(motor, "type").text = "transmission_interface/SimpleTransmission"
+            ET.SubElement(motor, "joint", name=drive.name)
+            actuator = ET.SubElement(motor, "actuator", name=f"{drive.name}:motor")
+            for key, value in (("rotor_inertia", rotor), ("gear_ratio", gear)):
+                if value is not None:
+                    ET.SubElement(actuator, f"{DRAKE}:{key}", value=repr(value))
+
     def _close(self, name: str, bodies: tuple[str, str], at: Floats, *, is_weld: bool) -> None:
         """A loop, by a link on each of two bodies that meet at a point [m]."""
         ends = [unique(f"closing_{name}_{side}", self._link_names) for side in (1, 2)]
@@ -133,4 +174,7 @@ def _remarks(mechanism: Mechanism) -> Iterator[str]:
     for drive in mechanism.coordinates:
         if drive.home:
             yield f"{drive.name} counts {drive.home:.9g} more in the machine's own file"
+    masses = inertias_of(mechanism, metres_of(mechanism.length_unit))
+    if unweighed := [body for body in mechanism.bodies if body not in masses and body != mechanism.base]:
+        yield f"no mass is known of {', '.join(unweighed)}"
     yield from left_out(mechanism)

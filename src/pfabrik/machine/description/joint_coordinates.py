@@ -50,6 +50,12 @@ class JointCoordinate:
         return value if value is None or len(self.joint.driven) < 2 else value[self.place]
 
     @property
+    def armature(self) -> float | None:
+        """Inertia of its motor's rotor on the coordinate [kg m², of a slide kg], gear² times; None where not known."""
+        rotor = self.said("rotor_inertia")
+        return None if rotor is None else float(rotor * (self.said("gear") or 1.0) ** 2)
+
+    @property
     def limits(self) -> Range:
         """Its range [rad or length], infinite where there is no limit."""
         if self.joint.range is None:
