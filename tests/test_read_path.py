@@ -16,6 +16,8 @@ from pfabrik.cli import main
 from pfabrik.common.cells import marked
 from pfabrik.errors import InvalidArgument, UnknownName
 
+TEMPLATES = Path(pf.__file__).parent / "machine" / "catalog" / "templates"
+
 
 def read(tmp_path: Path, text: str, name: str = "path.nc", machine: str = "stewart", **options: float) -> Any:
     (tmp_path / name).write_text(text)
@@ -426,9 +428,20 @@ def test_a_recording_with_columns_and_units_of_its_own(tmp_path: Path) -> None:
         (None, {"surge": 2.0}, "no column named 'surge'"),
         (None, -1.0, "scale"),
         (None, {"x": 0.0}, "scale of 'x'"),
+        ({"x": "x", "y": "x"}, None, "'x' twice"),
+        (None, {"roll": 2.0}, "no column 'roll' to scale; expected one of t, x, y, z"),
     ],
 )
 def test_columns_that_are_not_there(columns: Any, scale: Any, words: str, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("t,x,y,z\n0,0,0,195\n1,1,0,195\n")
     with pytest.raises((InvalidArgument, UnknownName), match=words):
         pf.read_path(tmp_path / "a.csv", made("stewart"), columns=columns, scale=scale)
+
+
+def test_one_factor_is_for_every_length_of_joints_and_none_of_angles(tmp_path: Path) -> None:
+    machine, metres, right = pf.load(TEMPLATES / "tricept.toml"), tmp_path / "m.csv", tmp_path / "mm.csv"
+    metres.write_text("Swing[0],Swing[1],Slide\n0,0,0.28\n5,-4,0.29\n")
+    right.write_text("Swing[0],Swing[1],Slide\n0,0,280\n5,-4,290\n")
+    for scale in (1000.0, {"lengths": 1000.0}, {"Slide": 1000.0}):
+        found = pf.read_path(metres, machine, scale=scale).targets
+        np.testing.assert_allclose(found, pf.read_path(right, machine).targets, atol=1e-9)

@@ -93,3 +93,18 @@ def test_progress_is_told_and_changes_no_answer(verb: object, monkeypatch: pytes
     assert done == [(100, 250), (200, 250), (250, 250)]
     for name in ("actuators", "pose") if verb is pf.solve_ik else ("margin", "binding"):
         np.testing.assert_array_equal(getattr(told, name), getattr(whole, name))
+
+
+def test_rows_that_are_no_poses_are_told_by_their_number_in_all(tmp_path: Path) -> None:
+    rows = ROWS.copy()
+    rows[[103, 140]] = np.nan
+    with pytest.raises(InvalidArgument, match="poses") as refused:
+        pf.sweep(pf.load("stewart"), rows, into=tmp_path, chunk=100)
+    assert refused.value.rows == (103, 140)
+
+
+def test_a_folder_that_is_a_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for place in (tmp_path / "file", tmp_path / "file" / "folder"):
+        with pytest.raises(InvalidArgument, match="expected a folder"):
+            pf.sweep(pf.load("stewart"), ROWS, into=place)

@@ -557,3 +557,19 @@ def test_a_dwell_stops_the_path_for_its_time(acceleration: float | None, tmp_pat
     assert none.duration == pf.time_path(track, **limits).duration
     with pytest.raises(InvalidArgument, match="dwells"):
         pf.time_path(track, dwells=-read.dwells, **limits)
+    with pytest.raises(InvalidArgument, match="at most 10000000 samples"):
+        pf.time_path(track, dwells=1e12 * read.dwells, **limits)
+
+
+@pytest.mark.parametrize("row", [1, 7, 20])
+def test_a_path_goes_on_from_where_it_dwelt(row: int) -> None:
+    """The move to the step that a dwell is before is made behind it, and nothing leaps."""
+    machine, targets = pf.load("stewart"), np.linspace([0.0, 0.0, 200.0], [20.0, 0.0, 200.0], 21)
+    limits = {"speed": 100.0, "acceleration": 1000.0}
+    timed = pf.time_path(pf.track(machine, targets), dwells=0.5 * (np.arange(21) == row), **limits)
+    parts = [each for each in (targets[:row], targets[row - 1 :]) if len(each) > 1]
+    alone = sum(pf.time_path(pf.track(machine, each), **limits).duration for each in parts)
+    assert timed.duration == pytest.approx(0.5 + alone, abs=1e-9)
+    np.testing.assert_allclose(timed.poses[-1, :3, 3], targets[-1], atol=1e-6)
+    rates = np.diff(timed.actuators, axis=0) / np.diff(timed.times)[:, None]
+    assert np.abs(rates).max() <= 100.0 * (1.0 + 1e-6)

@@ -71,14 +71,21 @@ def sweep(
     require_count("chunk", chunk)
     if targets.shape[1:] not in ((4, 4), (3,)) or not len(targets):
         raise InvalidArgument("poses", f"shape {targets.shape}", "(n, 4, 4) or (n, 3)")
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise InvalidArgument("into", f"{folder}, which is a file or lies in one", "a folder") from None
     asked, n, files = f"{dumps(mechanism)}{options}".encode(), len(targets), []
     with telling(f"sweep of {counted(n, 'pose')}", on_progress) as tell:
         for first in range(0, n, chunk):
             part, file = np.ascontiguousarray(targets[first : first + chunk]), folder / f"{first:08d}.npz"
             key = sha256(asked + str(part.dtype).encode() + part.tobytes()).hexdigest()
             if not _is_there(file, key):
-                answers = solve_ik(mechanism, part, options=options, executor=executor)
+                try:
+                    answers = solve_ik(mechanism, part, options=options, executor=executor)
+                except InvalidArgument as error:
+                    rows = [first + row for row in error.rows]
+                    raise InvalidArgument("poses", error.found, error.expected, rows=rows) from None
                 with whole_path(file) as path:
                     np.savez(path, key=key, **{name: getattr(answers, name) for name in FIELDS})
             files.append(file)

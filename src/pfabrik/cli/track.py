@@ -55,10 +55,12 @@ def _reading(columns: tuple[str, ...], scales: tuple[str, ...]) -> Reading:
         name, is_given, column = part.partition("=")
         if not (is_given and name.strip() and column.strip()):
             raise click.UsageError(f"--columns: found '{part}'; expected NAME=COLUMN, as in t=time,x=surge")
+        if name.strip() in named:
+            raise click.UsageError(f"--columns: found {name.strip()} twice; expected one column for each name")
         named[name.strip()] = column.strip()
-    from ..capabilities.paths.csv_table import LENGTHS, NUMERIC
+    from ..capabilities.paths.csv_table import ALL_LENGTHS, NUMERIC
 
-    factors = by_name("--scale", scales, "column", NUMERIC, positive, LENGTHS)
+    factors = by_name("--scale", scales, "column", NUMERIC, positive, (ALL_LENGTHS,))
     return {"columns": named, "scale": factors}
 
 

@@ -37,7 +37,10 @@ OF_POSES = (*POSITION, *(column for columns in OF_ANGLES.values() for column in 
 NUMERIC = (*OF_POSES, "t", "feed")
 
 LENGTHS = (*POSITION, "feed")
-"""Columns of lengths, which one factor is for."""
+"""Columns of lengths besides coordinates of joints."""
+
+ALL_LENGTHS = "lengths"
+"""The name under which one factor is for all lengths."""
 
 EXPECTED = "expected x, y, z and roll, pitch, yaw or qx, qy, qz, qw"
 
@@ -55,13 +58,18 @@ class CsvTable:
     """
 
     def __init__(self, lines: Iterable[str], mechanism: Mechanism, as_named: NamedColumns) -> None:
-        self._mechanism, self._scales = mechanism, as_named.scales
+        self._mechanism, self._factors = mechanism, as_named.of_lengths | as_named.scales
         self._table = CsvColumns(lines, as_named.spelled, NUMERIC, "x, y, z")
         header = self._table.header
         missing = [column for name, column in as_named.columns.items() if name not in header]
         if missing:
             known = ", ".join(as_named.columns.get(name, name.removeprefix(OF_FILE)) for name in header)
             raise WrongText(f"line {self._table.line}: no column '{missing[0]}'; expected one of those there: {known}")
+        unscaled = [name for name in as_named.scales if name not in header]
+        if unscaled:
+            raise WrongText(
+                f"line {self._table.line}: no column '{unscaled[0]}' to scale; expected one of {', '.join(header)}"
+            )
         by_joints = not any(name in OF_POSES for name in header)
         self._joints = joint_columns(mechanism, header) if by_joints else None
         if self._joints is None:
@@ -90,8 +98,8 @@ class CsvTable:
                 others[name] = [unmarked(cell) for cell in texts]
                 continue
             numbers = self._table.numbers(rows, name)
-            columns[name] = np.array(numbers, dtype=float) * self._scales.get(name, 1.0)
-            if name in self._scales:
+            columns[name] = np.array(numbers, dtype=float) * self._factors.get(name, 1.0)
+            if name in self._factors:
                 numbers = [f"{value!r}" for value in columns[name].tolist()]
             if name in ("t", "feed"):
                 others[name] = numbers
@@ -106,10 +114,16 @@ class NamedColumns:
     ----------
     columns : name of a column of targets -> what the file calls it.
     scales : the same -> a factor on its numbers.
+    of_lengths : every column of a length, there or not -> the factor on lengths, if there is one.
     """
 
     columns: Mapping[str, str]
-    scales: Mapping[str, float]
+    scales: dict[str, float]
+    of_lengths: dict[str, float]
+
+    def __bool__(self) -> bool:
+        """False where a table is as it is."""
+        return bool(self.columns or self.scales or self.of_lengths)
 
     def spelled(self, cell: str) -> str:
         """The name of a column: those of poses also in capitals; another that takes a given name is of the file."""
@@ -128,12 +142,24 @@ def named_columns(mechanism: Mechanism, columns: Any, scale: Any) -> NamedColumn
     for name, column in names.items():
         if not isinstance(column, str):
             raise InvalidArgument(f"columns['{name}']", repr(column), "what the file calls the column")
-    scales = scale if isinstance(scale, Mapping) else dict.fromkeys(LENGTHS, scale) if scale is not None else {}
-    joints = [f"{name}{unit}" for name in mechanism.coordinates_by_name for unit in ("", "_deg", "_rad")]
-    require_known("column", (*names, *scales), (*NUMERIC, *joints))
-    for name, factor in scales.items():
-        require_positive(f"scale of '{name}'", factor)
-    return NamedColumns(dict(names), {name: float(factor) for name, factor in scales.items()})
+    twice = next((column for column in names.values() if [*names.values()].count(column) > 1), None)
+    if twice is not None:
+        raise InvalidArgument("columns", f"'{twice}' twice", "a column of the file for each name")
+    given = dict(scale) if isinstance(scale, Mapping) else {ALL_LENGTHS: scale} if scale is not None else {}
+    known = (*NUMERIC, *joint_names(mechanism))
+    require_known("column", names, known)
+    require_known("column", given, (*known, ALL_LENGTHS))
+    factors = {name: require_positive(f"scale of '{name}'", factor) for name, factor in given.items()}
+    of_lengths = factors.pop(ALL_LENGTHS, None)
+    lengths = (*LENGTHS, *(each.name for each in mechanism.coordinates if each.kind == "length"))
+    return NamedColumns(dict(names), factors, {} if of_lengths is None else dict.fromkeys(lengths, of_lengths))
+
+
+def joint_names(mechanism: Mechanism) -> dict[str, str]:
+    """Name of a column, with its unit or without -> the coordinate of a joint that it has."""
+    angles = [each.name for each in mechanism.coordinates if each.kind == "angle"]
+    known = {each.name: each.name for each in mechanism.coordinates}
+    return known | {name + unit: name for name in angles for unit in ("_deg", "_rad")}
 
 
 class JointColumns(NamedTuple):
@@ -156,9 +182,7 @@ def joint_columns(mechanism: Mechanism, header: Sequence[str]) -> JointColumns |
 
     Angles are in degrees, as roll, pitch and yaw are, or in the unit behind their names.
     """
-    angles = {each.name: each.kind == "angle" for each in mechanism.coordinates}
-    known = {name: name for name in angles}
-    known |= {name + unit: name for name, is_angle in angles.items() if is_angle for unit in ("_deg", "_rad")}
+    known = joint_names(mechanism)
     columns = tuple(name for name in header if name in known)
     try:
         path = joint_path(mechanism, tuple(known[name] for name in columns))

@@ -77,7 +77,8 @@ def read_path(
     columns : mapping of str to str, optional
         What a table calls its columns: ``{"t": "time", "x": "surge [m]", "roll_rad": "roll"}``, of a recording say.
     scale : float or mapping of str to float, optional
-        Factor on a table's lengths, x, y, z and feed (1000 from m to mm), or on columns by name: ``{"t": 1e-3}``.
+        Factor on a table's lengths: x, y, z, feed and joints' (1000 from m to mm); or on columns by name, `lengths` for
+        all of those: ``{"lengths": 1000.0, "t": 1e-3}``.
 
     Raises
     ------
@@ -126,7 +127,7 @@ def path_blocks(
     name = "standard input" if str(file) == "-" else str(file)
     with refusing(name, "CSV or G-code that can be followed"), _opened(file) as handle:
         is_table, lines = _begun(lines_of(handle, 10 * most, "a path"), file.suffix.lower())
-        if not is_table and (as_named.columns or as_named.scales):
+        if not is_table and as_named:
             raise WrongText("G-code; expected a table, of which columns and scale are")
         if is_table:
             table = CsvTable(lines, mechanism, as_named)

@@ -15,7 +15,9 @@ AT_ONCE = 1e-9
 
 
 def pieces_of(dwells: Floats) -> list[tuple[float, slice]]:
-    """The rows of a path between times at rest, each with the time before it; the last may have none.
+    """The rows of a path from one place of rest to the next, each with the time before it; some may have one row.
+
+    A path rests where the row before a time at rest is, and goes on from there.
 
     Parameters
     ----------
@@ -23,7 +25,7 @@ def pieces_of(dwells: Floats) -> list[tuple[float, slice]]:
     """
     ends = [0, *np.flatnonzero(dwells > 0.0).tolist(), len(dwells)]
     before = [0.0, *dwells[dwells > 0.0].tolist()]
-    return [(time, slice(a, b)) for time, a, b in zip(before, ends[:-1], ends[1:], strict=True)]
+    return [(time, slice(max(a - 1, 0), b)) for time, a, b in zip(before, ends[:-1], ends[1:], strict=True)]
 
 
 def with_pauses(parts: Sequence[tuple[float, Timed]], last: float, every: float) -> Timed:

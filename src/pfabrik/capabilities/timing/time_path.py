@@ -81,7 +81,8 @@ def time_path(
     rate : float, optional
         Rate of the samples that are returned [1/s].
     dwells : array (n,), optional
-        Time at rest before each step [s], as a `Path` has it: the path stops there, and its parts are timed one by one.
+        Time at rest before each step [s], as a `Path` has it: the path stops at the step before (or at the first), and
+        its parts are timed one by one.
 
     Raises
     ------
@@ -110,6 +111,8 @@ def time_path(
         raise InvalidArgument("track", "an empty path", "two steps or more that differ")
     refuse_leaps(track)
     pauses = np.zeros(len(track)) if dwells is None else array("dwells", dwells, f"{len(track)}", holds=is_not_negative)
+    if pauses.sum() / every > MOST_SAMPLES:
+        raise InvalidArgument("dwells", f"{pauses.sum():.4g} s at rest", f"at most {MOST_SAMPLES} samples")
     pause, parts = 0.0, []
     refuse_crossings(track)
     for dwell, rows in pieces_of(pauses):
