@@ -603,6 +603,10 @@ def test_examples_of_the_help_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     Path("robot.xml").write_text(pf.interop.to_mjcf(STEWART), encoding="utf-8")
     Path("path.csv").write_text("x,y,z\n0,0,190\n5,0,195\n", encoding="utf-8")
     Path("part.gcode").write_text("G1 X0 Y0 Z5 F3000\nG1 X5 Y0\nG1 X5 Y5 Z6\n", encoding="utf-8")
+    rows = [f"{k / 50},{k / 50},{5 * np.sin(k / 9):.6f},0,{5 * np.cos(k / 7):.6f},1,2,3,1" for k in range(60)]
+    Path("measured.csv").write_text(
+        "\n".join(["t,time,x,y,z,effort_A1,effort_A2,effort_A3,tau1", *rows]) + "\n", encoding="utf-8"
+    )
     for line in LINES:
         done = pfabrik(line)
         assert done.exit_code in (0, 1) and done.output, (line, done.stderr)

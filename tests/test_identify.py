@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import pfabrik as pf
+from pfabrik.machine.files import dumps
+from tests.command import pfabrik
 from tests.test_dynamics import units, weighed
 
 
@@ -171,12 +175,136 @@ def test_a_body_far_from_the_file_is_doubted() -> None:
     efforts = pf.inverse_dynamics(solution, **how).actuators
 
     def doubt(times: float) -> str:
-        heavier = truth.with_masses(pf.Mass(m.body, times * m.mass, m.centre, m.inertia) for m in truth.masses)
-        described = moved(heavier, solution)
-        return pf.identify(described, efforts, friction=False, sigma=0.01, **how).doubt
+        own = {"platform": times}
+        other = [pf.Mass(m.body, own.get(m.body, 1.0) * m.mass, m.centre, m.inertia) for m in truth.masses]
+        described = moved(truth.with_masses(other), solution)
+        return pf.identify(described, efforts, bodies="platform", friction=False, sigma=0.01, **how).doubt
 
     assert doubt(0.25) == ""
     assert re.search(r"'\w+' would differ from the file by [\d.]+ times", doubt(0.02))
+
+
+Measured = tuple[pf.Solution, Any, dict[str, Any]]
+
+
+def recorded(name: str, seed: int) -> tuple[pf.Mechanism, Measured, Any]:
+    """The machine as its drawing has it, how it moved, its exact efforts, and their noise: six seconds at 50 Hz."""
+    random, truth = np.random.default_rng(seed), rubbing(weighed(pf.load(name)), rotor=None)
+    home, t, v, a = pf.solve_ik(truth, truth.home_pose).actuators, np.linspace(0.0, 6.0, 300)[:, None], 0.0, 0.0
+    x = home
+    for k in range(3):
+        size = 0.03 * units(truth)[0] * random.standard_normal(len(home)) / (k + 1)
+        speed, phase = random.uniform(3.0, 9.0, len(home)), random.uniform(0.0, 6.0, len(home))
+        x = x + size * np.sin(speed * t + phase)
+        v, a = v + size * speed * np.cos(speed * t + phase), a - size * speed**2 * np.sin(speed * t + phase)
+    solution, how = pf.solve_fk(truth, x), {"twists": v, "accelerations": a, "at": "actuators"}
+    assert solution
+    efforts = pf.inverse_dynamics(solution, **how).actuators
+    off = [pf.Mass(m.body, m.mass * random.uniform(0.8, 1.2), m.centre, m.inertia) for m in truth.masses]
+    noise = 0.01 * np.abs(efforts).max() * random.standard_normal(efforts.shape)
+    return rubbing(truth.with_masses(off), None, None), (solution, efforts, how), noise
+
+
+def by_columns(efforts: Any, factor: float, column: int = 0) -> Any:
+    return np.where(np.arange(efforts.shape[1]) == column, factor, 1.0) * efforts
+
+
+WRONG = {
+    "late": lambda y: np.roll(y, 3, axis=0),
+    "exchanged": lambda y: y[:, [1, 0, *range(2, y.shape[1])]],
+    "noise": lambda y: 0.3 * np.abs(y).max() * np.random.default_rng(0).standard_normal(y.shape),
+    "backwards": lambda y: y[::-1],
+    "half": lambda y: 0.5 * y,
+    "double": lambda y: 2.0 * y,
+    "five times": lambda y: 5.0 * y,
+    "a thousandth": lambda y: 1e-3 * y,
+    "opposite": lambda y: -y,
+    "one opposite": lambda y: by_columns(y, -1.0),
+    "clipped": lambda y: np.clip(y, -0.5 * np.abs(y).max(axis=0), 0.5 * np.abs(y).max(axis=0)),
+}
+"""What goes wrong with efforts."""
+
+RECORDED = ("five_bar", "delta", "hexaglide", "orthoglide", "prr")
+
+
+def doubt_of(drawing: pf.Mechanism, measured: Measured, efforts: Any, **options: Any) -> str:
+    solution, _, how = measured
+    return pf.identify(moved(drawing, solution), efforts, **how, **options).doubt
+
+
+@pytest.mark.parametrize("wrong", ["late", "exchanged", "noise", "double"])
+def test_efforts_of_other_times_actuators_or_gears_are_doubted(wrong: str) -> None:
+    drawing, measured, noise = recorded("five_bar", 3)
+    assert doubt_of(drawing, measured, measured[1] + noise) == ""
+    assert doubt_of(drawing, measured, WRONG[wrong](measured[1]) + noise)
+
+
+def test_masses_of_other_bodies_that_are_wrong_are_doubted() -> None:
+    drawing, measured, noise = recorded("five_bar", 3)
+    exact = [m for m in weighed(pf.load("five_bar")).masses if m.body != "link1"]
+    right = drawing.with_masses([*exact, *(m for m in drawing.masses if m.body == "link1")])
+    assert doubt_of(right, measured, measured[1] + noise, bodies="link1") == ""
+    wrong = [pf.Mass(m.body, 2.0 * m.mass, m.centre, m.inertia) if m.body == "link3" else m for m in right.masses]
+    assert doubt_of(drawing.with_masses(wrong), measured, measured[1] + noise, bodies="link1")
+
+
+def test_deviations_count_rows_whose_noise_follows_from_the_row_before_for_less() -> None:
+    """Of noise e' = r e + white, a mean of n rows is as good as of n (1 - r) / (1 + r)."""
+    drawing, measured, white = recorded("five_bar", 3)
+    solution, efforts, how = measured
+    found, follows = [], 0.8
+    for seed in range(6):
+        noise = np.std(white) * np.random.default_rng(seed).standard_normal(white.shape)
+        for row in range(1, len(noise)):
+            noise[row] = follows * noise[row - 1] + np.sqrt(1.0 - follows**2) * noise[row]
+        result = pf.identify(moved(drawing, solution), efforts + noise, **how)
+        dry = [list(result.names).index(f"{name}.viscous") for name in ("p1", "p5")]
+        found.append((result.values[dry] - 0.02) / result.deviations[dry])
+    assert 0.4 < np.sqrt(np.mean(np.square(found))) < 1.6
+
+
+@pytest.mark.campaign
+def test_wrong_efforts_are_doubted_on_four_machines_of_five_and_right_ones_on_one_in_twenty() -> None:
+    doubted = dict.fromkeys([*WRONG, "other motion", "other masses"], 0)
+    for name in RECORDED:
+        drawing, measured, noise = recorded(name, 3)
+        for wrong, made in WRONG.items():
+            doubted[wrong] += bool(doubt_of(drawing, measured, made(measured[1]) + noise))
+        doubted["other motion"] += bool(doubt_of(drawing, measured, recorded(name, 80)[1][1] + noise))
+        body = drawing.masses[-1].body
+        off = [
+            pf.Mass(m.body, (1.0 + (-1.0) ** k * 0.4) * m.mass, m.centre, m.inertia)
+            for k, m in enumerate(drawing.masses)
+        ]
+        doubted["other masses"] += bool(doubt_of(drawing.with_masses(off), measured, measured[1] + noise, bodies=body))
+    assert min(doubted.values()) >= 4, doubted
+    right = [recorded(name, 100 + seed) for name in ("five_bar", "prr") for seed in range(50)]
+    assert sum(bool(doubt_of(drawing, measured, measured[1] + noise)) for drawing, measured, noise in right) <= 5
+
+
+def with_thin_rods(machine: pf.Mechanism, seed: int) -> pf.Mechanism:
+    """Bodies of random masses between their joints, those with two joints as thin rods on the line between these."""
+    random, masses = np.random.default_rng(seed), []
+    for body in machine.bodies[1:]:
+        ends = [np.array(j.at) for j in machine.joints if body in j.connects and j.at is not None]
+        along = ends[1] - ends[0] if len(ends) == 2 else 0.1 * machine.characteristic_length * np.eye(3)
+        mass, second = random.uniform(0.2, 0.5), np.atleast_2d(along).T @ np.atleast_2d(along) / 12.0
+        inertia = mass * (np.trace(second) * np.eye(3) - second)
+        masses.append(pf.Mass(body, mass, np.mean(ends, axis=0), inertia))
+    return machine.with_masses(masses)
+
+
+@pytest.mark.parametrize("name", ["linear_delta", "delta"])
+def test_the_identified_machine_exerts_what_the_fit_says_where_rods_may_spin(name: str) -> None:
+    truth = rubbing(with_thin_rods(pf.load(name), 1), rotor=None)
+    solution, how = wandering(truth, 1)
+    efforts = pf.inverse_dynamics(solution, **how).actuators
+    noise = 0.01 * np.abs(efforts).max() * np.random.default_rng(0).standard_normal(efforts.shape)
+    drawing = rubbing(with_thin_rods(pf.load(name), 2), None, None)
+    result = pf.identify(moved(drawing, solution), efforts + noise, **how)
+    exerted = pf.inverse_dynamics(moved(result.mechanism, solution), **how).actuators
+    np.testing.assert_allclose(efforts + noise - exerted, result.residuals, atol=1e-6 * np.std(noise))
+    np.testing.assert_allclose(result.rms, np.std(noise), rtol=0.25)
 
 
 def test_refusals_name_what_is_wrong() -> None:
@@ -193,3 +321,28 @@ def test_refusals_name_what_is_wrong() -> None:
         pf.identify(solution, np.full_like(efforts, np.nan), **how)
     with pytest.raises(pf.errors.InvalidArgument, match="nothing says how good they are"):
         pf.identify(solution[:3], efforts[:3], **{**how, "twists": 0.0 * efforts[0], "accelerations": efforts[:3]})
+
+
+def test_the_command_reads_efforts_beside_a_path_and_writes_the_machine(tmp_path: Path) -> None:
+    machine = weighed(pf.load("delta"), own={"platform": 0.5, "arm1": 0.2, "arm2": 0.2, "arm3": 0.2})
+    t = np.linspace(0.0, 3.0, 300)
+    points = np.stack([30 * np.sin(3 * t), 25 * np.cos(5 * t), -190 + 15 * np.sin(7 * t)], axis=1)
+    efforts = pf.inverse_dynamics(
+        pf.track(machine, points, times=t), loads={"platform": (0.3, (0.0, 0.0, -190.0))}
+    ).actuators
+    (tmp_path / "delta.toml").write_text(dumps(machine))
+    cells = [[f"{value!r}" for value in row] for row in np.column_stack([t, points, efforts]).tolist()]
+    cells[7][-1] = ""
+    header = "time,x,y,z,tau1,effort_A2,effort_A3"
+    (tmp_path / "data.csv").write_text("\n".join([header, *map(",".join, cells)]) + "\n")
+    words = ["identify", tmp_path / "delta.toml", tmp_path / "data.csv", "--body", "platform", "--no-friction"]
+    result = pfabrik([*words, "--columns", "t=time,effort_A1=tau1", "-o", tmp_path / "new.toml", "--json"])
+    assert result.exit_code == 0, result.output
+    assert json.loads(result.stdout)["parameters"][0]["value"] == pytest.approx(0.8, rel=1e-3)
+    found = {each.body: each.mass for each in pf.load(tmp_path / "new.toml").masses}
+    assert found["platform"] == pytest.approx(0.8, rel=1e-3) and found["arm1"] == pytest.approx(0.2)
+    assert "no column effort_A1" in pfabrik([*words, "--columns", "t=time"]).stderr
+    late = [[*row[:4], *cells[(place + 30) % 300][4:]] for place, row in enumerate(cells)]
+    (tmp_path / "data.csv").write_text("\n".join([header, *map(",".join, late)]) + "\n")
+    result = pfabrik([*words, "--columns", "t=time,effort_A1=tau1"])
+    assert result.exit_code == 1 and "from row to row" in result.stdout + result.stderr

@@ -27,6 +27,7 @@ __all__ = ["main"]
         "calibrate": ("calibrate", "Find the parameters of a machine from measurements."),
         "time": ("track", "Find the fastest way along a path."),
         "effort": ("motor_forces", "Tell what motors exert along a path."),
+        "identify": ("motor_forces", "Find masses and friction from efforts measured in motion."),
         "speed": ("questions", "Tell how fast the platform may move."),
         "singularities": ("workspace", "Tell how near singularities are, at a pose or over a workspace."),
         "forces": ("statics", "Tell what the actuators exert to hold a load."),

@@ -1,4 +1,4 @@
-"""``pfabrik effort``: what motors exert along a path."""
+"""``pfabrik effort`` and ``identify``: what motors exert along a path, and what their efforts tell of masses."""
 
 from __future__ import annotations
 
@@ -10,14 +10,26 @@ import click
 
 import pfabrik as pf
 
+from ..common.cells import is_finite
 from .arguments import FINITE, MECH, Triple, load
-from .outputs import OUTPUT, STANDARD, check_outputs, refuse_both_on_stdout, require_picture, whole_file, write_picture
+from .outputs import (
+    OUTPUT,
+    STANDARD,
+    check_outputs,
+    force_option,
+    refuse_both_on_stdout,
+    refuse_existing,
+    require_picture,
+    whole_file,
+    write_picture,
+)
 from .printing import json_option, print_result
 from .statics import Loads, carrying, weighed
 from .track import at_lines_of, limiting, recorded
 
 if TYPE_CHECKING:
     from ..capabilities.paths import path as paths
+    from ..common.arrays import Floats
     from .track import LimitsOf, Reading
 
 
@@ -87,3 +99,89 @@ def at_its_times(mechanism: pf.Mechanism, path: paths.Path, sample_time: float |
         raise click.UsageError("the path has no times: give --sample-time, or a limit to time it by, such as --speed")
     times = path.times if sample_time is None else None
     return pf.track(mechanism, path.targets, times=times, sample_time=sample_time)
+
+
+EFFORT = "effort_"
+"""Before the name of an actuator, in columns of what it exerts."""
+
+
+@click.command()
+@click.argument("mech", type=MECH)
+@click.argument("data", type=click.Path(path_type=Path, allow_dash=True))
+@click.option("--body", "bodies", multiple=True, metavar="NAME", help="A body to identify. Default: all that move.")
+@click.option("--rotors", is_flag=True, help="Identify the rotors of actuators too.")
+@click.option("--no-friction", is_flag=True, help="Leave friction as in the file.")
+@click.option("--sigma", type=FINITE, help="Standard deviation of the efforts [N, N m]. Default: that of what is left.")
+@click.option("-o", "--output", help="Mechanism file to write, with the identified values.", **OUTPUT)
+@click.option("--sample-time", type=FINITE, metavar="S", help="Time from one row to the next [s].")
+@recorded
+@carrying
+@force_option
+@json_option()
+def identify(
+    mech: str,
+    data: Path,
+    bodies: tuple[str, ...],
+    rotors: bool,
+    no_friction: bool,
+    sigma: float | None,
+    output: Path | None,
+    sample_time: float | None,
+    reading: Reading,
+    loads: Loads,
+    gravity: Triple,
+    force: bool,
+    as_json: bool,
+) -> int:
+    """Find masses and friction from efforts measured in motion.
+
+    DATA is a CSV file as of effort, with times or --sample-time, and a column effort_NAME [N, N m] for each actuator,
+    or what --columns calls so; - is standard input. Rows with an empty effort are left out.
+
+    What the efforts do not determine stays as in the file. The exit code is 1 where the whole is in doubt.
+    """
+    refuse_both_on_stdout(output, as_json)
+    check_outputs([("-o", output)], [data, Path(mech)], as_json=as_json)
+    if output is not None:
+        refuse_existing(output, force)
+    mechanism = load(mech)
+    columns: dict[str, str] = {f"{EFFORT}{name}": f"{EFFORT}{name}" for name in mechanism.actuator_names}
+    named = reading["columns"]
+    columns |= {name: named[name] for name in columns if name in named}
+    reading = {**reading, "columns": {name: column for name, column in named.items() if name not in columns}}
+    read = pf.read_path(data, mechanism, **reading)
+    with at_lines_of(read):
+        motion = at_its_times(mechanism, read, sample_time)
+    result = pf.identify(
+        motion,
+        _efforts(read, list(columns.values())),
+        gravity=gravity,
+        loads=loads,
+        bodies=bodies or None,
+        friction=not no_friction,
+        rotors=rotors,
+        sigma=sigma,
+    )
+    if output is not None:
+        from ..machine.files import dumps
+
+        with whole_file(output) as file:
+            file.write(dumps(result.mechanism))
+    print_result(as_json, result, to_stderr=output == STANDARD)
+    return int(bool(result.doubt))
+
+
+def _efforts(read: paths.Path, columns: list[str]) -> Floats:
+    """Efforts of the columns of a file, (n, n_a); NaN where a cell is empty."""
+    import numpy as np
+
+    if missing := [column for column in columns if column not in read.others]:
+        raise click.UsageError(f"no column {', '.join(missing)}; --columns effort_NAME=COLUMN names those of the file")
+    efforts = np.full((len(read.lines), len(columns)), np.nan)
+    for place, column in enumerate(columns):
+        for row, cell in enumerate(read.others[column]):
+            text = cell.replace(",", ".")
+            if text.strip() and not is_finite(text):
+                raise click.UsageError(f"line {read.lines[row]}: column '{column}': found '{cell}'; expected a number")
+            efforts[row, place] = float(text) if text.strip() else np.nan
+    return efforts

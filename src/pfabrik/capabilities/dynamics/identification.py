@@ -11,7 +11,8 @@ import numpy as np
 from ...common.arrays import Floats, Ints, Mask, as_plain
 from ...common.printed import Printed, ResultTable, error_text, plain
 from ...machine.description.mechanism import Mechanism
-from .effort_fit import FAR, EffortFit
+from .effort_doubt import doubt_of
+from .effort_fit import EffortFit
 from .inertial_fit import combined
 from .unknowns import Unknowns
 
@@ -20,9 +21,6 @@ SHOWN = 3
 
 UNSEEN = 1e-9
 """Share of the largest, in its scale, up to which efforts do not depend on a parameter at all."""
-
-ABSURD = 10.0
-"""Change of a body, in what it is expected to be off by, from which it is none that anybody describes so."""
 
 
 class BaseParameter(NamedTuple):
@@ -143,15 +141,12 @@ class Identification(Printed):
 
     @property
     def doubt(self) -> str:
-        """Why these values may be wrong as a whole, in a sentence; "" if nothing says so."""
-        bodies, missed, found = tuple(self.points), self._fit.missed, ""
-        changes = np.abs(self._fit.found[: 10 * len(bodies)]).reshape(-1, 10).max(axis=1)
-        if changes.max(initial=0.0) > ABSURD:
-            body, times = bodies[changes.argmax()], f"{changes.max():.3g}"
-            found = f"'{body}' would differ from the file by {times} times what is expected of it"
-        if missed > FAR:
-            found = f"no possible bodies explain these efforts, missed by {missed:.3g} times their noise"
-        return f"{found}: are they in N and N m, with the right signs, and of this motion?" if found else ""
+        """Why these values may be wrong as a whole, in a sentence; "" if nothing says so.
+
+        Efforts that are late, of another motion, of exchanged actuators or of other loads leave residuals that follow
+        from row to row, or explain little; of another unit, gear or current they make all masses a multiple.
+        """
+        return doubt_of(self._unknowns, self._fit)
 
     @property
     def undetermined(self) -> tuple[str, ...]:

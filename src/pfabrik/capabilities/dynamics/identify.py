@@ -50,8 +50,9 @@ def identify(
     """Masses of bodies, and friction and rotors of actuators, from efforts measured in motion.
 
     The most likely values, by weighted least squares, of those that bodies can have. Each parameter is expected to be
-    as the file has it, and off by as much as its body weighs: what the efforts do not determine stays there. Parts that
-    nothing holds, such as a rod that spins between two ball joints, are taken to move as the masses of the file would.
+    as the file has it, and off by as much as its body weighs: what the efforts do not determine stays there. A rod
+    between two ball joints, on whose line its centre is, keeps its moment about that; other parts that nothing holds
+    are taken to move as the masses of the file would.
 
     Parameters
     ----------

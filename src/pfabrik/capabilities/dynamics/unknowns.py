@@ -13,8 +13,9 @@ from ...kinematics import inertias_of
 from ...machine.description.joints import Joint
 from ...machine.description.mechanism import Mass, Mechanism
 from ...machine.files.units import metres_of
+from ...tolerances import TOLERANCES
 from .drives import Drives, drives_of
-from .inertial_fit import FROM_DENSITY, IMPOSSIBLE
+from .inertial_fit import FROM_DENSITY, IMPOSSIBLE, TO_DENSITY
 from .regressor import PARTS, POWERS, BodyScales, EffortRows, ten_of
 
 FRICTION, ROTOR = ("dry", "viscous"), "rotor"
@@ -97,7 +98,31 @@ class Unknowns:
         """Efforts by scaled parameters, (n, n_a, p)."""
         moves = {"dry": rows.signs, "viscous": rows.rates, "rotor": rows.gains * self.gears**2}
         own = [moves[kind][..., None] * np.eye(len(self.gears)) for kind in self.kinds]
-        return np.asarray(np.concatenate([rows.by_bodies, *own], axis=2) @ self.by_scaled)
+        found = np.concatenate([rows.by_bodies, *own], axis=2) @ self.by_scaled
+        for body, line in self.rods.items():
+            block = slice(10 * body, 10 * body + 10)
+            found[..., block] = found[..., block] @ _spread_along(line)
+        return np.asarray(found, float)
+
+    @cached_property
+    def rods(self) -> dict[int, Floats]:
+        """Bodies between two ball joints with their centres on the line of these, and its direction, (3,).
+
+        They may spin at will, so that efforts depend on their mass, its place on the line and a moment across; all else
+        would have them swing.
+        """
+        rods = {}
+        for place, (body, point) in enumerate(zip(self.scales.bodies, self.scales.points, strict=True)):
+            joints = [joint for joint in self.mechanism.joints if body in joint.connects]
+            ends = [
+                np.asarray(joint.at, float) for joint in joints if joint.type == "spherical" and joint.at is not None
+            ]
+            length = float(np.linalg.norm(ends[1] - ends[0])) if len(ends) == len(joints) == 2 else 0.0
+            if length > 0.0:
+                line = (ends[1] - ends[0]) / length
+                if np.linalg.norm(np.cross(line, point - ends[0])) <= TOLERANCES.alignment * length:
+                    rods[place] = line
+        return rods
 
     def mass(self, values: Floats, place: int) -> Mass:
         """The mass of a body by parameters (p,); none where that is rounding."""
@@ -134,3 +159,13 @@ class Unknowns:
         if places and FRICTION[0] in values:
             changed["friction"] = tuple(zip(*(values[kind][places].tolist() for kind in FRICTION), strict=True))
         return replace(joint, **{name: each if len(places) == 2 else each[0] for name, each in changed.items()})
+
+
+def _spread_along(line: Floats) -> Floats:
+    """The projection of scaled parameters of a body, (10, 10), on those of masses along a line (3,)."""
+    moments = np.eye(3) - np.outer(line, line)
+    shapes = np.zeros((3, 10))
+    shapes[0, 0], shapes[1, 1:4] = 1.0, line
+    shapes[2, 4:] = moments[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    basis = np.linalg.qr(TO_DENSITY @ shapes.T)[0]
+    return np.asarray(basis @ basis.T, float)
