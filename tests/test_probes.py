@@ -179,3 +179,11 @@ def test_what_may_be_freed_is_listed_by_kind(tmp_path: Path) -> None:
     for line in listed.stdout.splitlines()[1:]:
         kind, name = line.split()[:2]
         assert pf.parameters(machine, name).names == (name,) and name in pf.parameters(machine, kind).names
+
+
+def test_a_height_map_without_its_last_rows_is_refused(tmp_path: Path) -> None:
+    labels = "axis0,axis1,min0,max0,min1,max1,radius,spacing0,spacing1,num0,num1\nX,Y,-9,9,-9,9,95,9,9,3,3\n"
+    path = tmp_path / "heightmap.csv"
+    path.write_text("RepRapFirmware height map file v2\n" + labels + 2 * "0.010,0.020,0.030\n")
+    with pytest.raises(InvalidArgument, match="2 of the 3 rows"):
+        pf.read_measurements(path, pf.load("linear_delta"))

@@ -95,16 +95,19 @@ def _of_map(lines: Iterator[str], begin: int) -> Iterator[tuple[list[float], str
         raise WrongText(f"line {begin + 1}: found '{','.join(cells)[:40]}'; expected numbers of a grid in X and Y")
     x, y, dx = (float(said[name]) for name in ("min0", "min1", "spacing0"))
     dy, n_x, n_y = float(said.get("spacing1", dx)), float(said["num0"]), float(said["num1"])
-    n_points = 0
+    n_points, n_rows = 0, 0
     for row, line in enumerate(lines):
         heights = [cell.strip() for cell in line.split(",")]
         if heights == [""]:
             continue
         if len(heights) != n_x or row >= n_y or not all(map(is_finite, heights)):
             raise WrongText(f"line {begin + 2 + row}: found '{line.strip()[:40]}'; expected {n_x:g} heights")
+        n_rows += 1
         for column, height in enumerate(heights):
             if height != NOT_PROBED:
                 n_points += 1
                 yield [x + dx * column, y + dy * row, float(height)], f"line {begin + 2 + row}, point {column + 1},"
+    if n_rows != n_y:
+        raise WrongText(f"{n_rows} of the {n_y:g} rows that its line {begin + 1} says; expected the whole map")
     if not n_points:
         raise WrongText("no point that was probed; expected heights")
