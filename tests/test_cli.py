@@ -191,7 +191,9 @@ def test_json_of_check_and_time_is_one_object() -> None:
     write_files("revolving.toml", "untasked.toml", "edge.csv", "hundred_legs.toml")
     found = printed_json("check five_bar")
     assert (found["ok"], found["joints"], found["actuators"], found["sub_chains"]) == (True, 5, 2, 2)
-    assert found["notes"] == []
+    (note,) = found["notes"]
+    assert "a task that fits is y z" in note
+    assert printed_json("check delta")["notes"] == []
     (note,) = printed_json("check untasked.toml")["notes"]
     assert "asks for 6 coordinates" in note
     with pytest.raises(pf.errors.InvalidMechanism) as raised:

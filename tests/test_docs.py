@@ -300,7 +300,7 @@ def test_commands_of_the_readme_answer(line: str, folder: Path) -> None:
     (folder / "path.csv").write_text("x,y,z\n0,0,190\n0,0,300\n", encoding="utf-8")
     done = pfabrik(line.removeprefix("pfabrik "))
     assert done.exit_code in (0, 1), done.stderr
-    assert done.stdout
+    assert done.output
 
 
 SEEING = ROOT / "docs" / "see-your-machine.md"

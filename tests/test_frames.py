@@ -227,7 +227,7 @@ def _patch(patch: pytest.MonkeyPatch, wrong: str) -> None:
     elif wrong == "poses":
         patch.setattr(sdf_links, "pose_in", _askew(sdf_links.pose_in))
     elif wrong == "origins":
-        patch.setattr(urdf_links, "origin_of", _askew(urdf_links.origin_of))
+        patch.setattr(urdf_links, "frame_at", _askew(urdf_links.frame_at))
     elif wrong == "places of loops":
         patch.setattr(told_loops, "_place", _askew(told_loops._place))
     elif wrong == "a joint of SDF":

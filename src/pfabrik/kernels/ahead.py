@@ -25,8 +25,8 @@ from .lattice import join, number_points
 from .legs.answer import answer
 from .legs.blocks import answer_blocks
 from .legs.complete_poses import are_poses
-from .legs.feasibility import feasibility, read_targets
 from .legs.margin_blocks import margins_in_blocks
+from .legs.margin_rows import feasibility, read_targets
 from .noted_steps import evaluate
 from .passes import plan as P
 from .passes.solve import solve_by_passes

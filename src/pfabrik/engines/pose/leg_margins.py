@@ -35,7 +35,7 @@ def leg_margins(model: Model, poses: Floats, start_pose: Floats, sides: Floats) 
         if not sum(in_blocks(run, len(poses), ROWS_A_RUN)):
             return margin, binding
         unsolved = np.flatnonzero(binding == UNKNOWN)
-    from ...kernels.legs.feasibility import feasibility as measure
+    from ...kernels.legs.margin_rows import feasibility as measure
 
     unsolved_poses, margins, bindings = poses[unsolved], np.empty(len(unsolved)), np.empty(len(unsolved), np.int64)
     nothing = np.empty((0, 0))

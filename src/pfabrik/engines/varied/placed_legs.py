@@ -10,7 +10,7 @@ import numpy as np
 
 from ...common.arrays import Floats
 from ...kernels import vectors
-from ...kernels.legs import answer, feasibility, frames
+from ...kernels.legs import answer, frames, margin_rows
 from ...kernels.legs import records as K
 from ...kernels.search_constants import NEARLY_CLOSED
 from ...machine.decomposition.home_numbers import Fields
@@ -88,11 +88,11 @@ def _margins(records: dict[str, Any], values: Any, rows: Any) -> Iterator[Any]:
     """Margins in the order of `LegTable.measured_limits`; infinite where a leg reaches, and where it closes."""
     legs = records["legs"]
     for coordinate in records["limited"]:
-        yield from of_numbers(feasibility.range_margins)(coordinate, values)
+        yield from of_numbers(margin_rows.range_margins)(coordinate, values)
     for cone in records["cones"]:
-        yield of_numbers(feasibility.cone_margin)(cone, values)
-    reach = [of_numbers(feasibility.reach_margin)(leg, own) for leg, own in zip(legs, values, strict=True)]
-    closed = [of_numbers(feasibility.closing_margin)(legs, k, rows, values) for k in range(len(legs))]
+        yield of_numbers(margin_rows.cone_margin)(cone, values)
+    reach = [of_numbers(margin_rows.reach_margin)(leg, own) for leg, own in zip(legs, values, strict=True)]
+    closed = [of_numbers(margin_rows.closing_margin)(legs, k, rows, values) for k in range(len(legs))]
     for margin in (*reach, *closed):
         yield where(margin < -NEARLY_CLOSED, margin, math.inf)
 

@@ -24,7 +24,7 @@ from ...errors import UnknownName, UnsupportedMechanism
 from ...kernels.enclosing import N_PLACES
 from ...kernels.handle import Handle
 from ...kernels.home import measure_home
-from ...kernels.legs.feasibility import feasibility, read_targets
+from ...kernels.legs.margin_rows import feasibility, read_targets
 from ...kernels.search_constants import CLOSED, NEARLY_CLOSED
 from ...machine.decomposition.leg_forms import NoLeg
 from ...machine.decomposition.leg_table import LegTable, leg_table

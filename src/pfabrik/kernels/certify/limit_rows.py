@@ -1,6 +1,6 @@
 """Limits over a cell of poses: numbers that are positive where a limit is kept, one row each.
 
-Rows are in the order of `legs.feasibility`: two for each range, one for each cone (its cosine less that of the half
+Rows are in the order of `legs.margin_rows`: two for each range, one for each cone (its cosine less that of the half
 angle), then two for the reach of each leg with a proximal joint. Behind them are four for each pair of links
 (`link_rows`).
 """

@@ -27,8 +27,8 @@ from .columns import (
     fill_inverse,
     fill_poses,
 )
-from .feasibility import relative_margin
 from .leg_constants import KEPT
+from .margin_rows import relative_margin
 from .records import SHARED, SLIDE, open_table
 
 # Difference up to which cosines of one group are equal, so that margins are to `KEPT`, but beside the axis of a cone.

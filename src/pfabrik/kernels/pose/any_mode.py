@@ -15,9 +15,9 @@ from ..legs.answer import (
     write_answer,
 )
 from ..legs.complete_poses import read_target
-from ..legs.feasibility import largest_constraint
 from ..legs.frames import set_frames
 from ..legs.leg_constants import KEPT, LEAST_MARGIN
+from ..legs.margin_rows import largest_constraint
 from ..legs.records import Table
 from ..rows import PENDING, REACHED, UNSURE
 from ..vectors import copy_row

@@ -159,7 +159,7 @@ def task_remark(mechanism: Mechanism) -> str:
 
 def task_hint(mechanism: Mechanism) -> str:
     """A sentence on a task that asks for more coordinates than the end effector has freedoms; empty if it does not."""
-    if len(mechanism.joints) > MOST_JOINTS_FOR_FREEDOM:
+    if len(mechanism.joints) > MOST_JOINTS_FOR_FREEDOM or tilt_axis(mechanism) is not None:
         return ""
     tasks, freedoms = fitting_tasks(mechanism), generic_of(mechanism).mobility.platform
     asked = int(_counted(mechanism.task).sum())
