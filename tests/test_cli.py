@@ -609,6 +609,8 @@ def test_examples_of_the_help_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     Path("measured.csv").write_text(
         "\n".join(["t,time,x,y,z,effort_A1,effort_A2,effort_A3,tau1", *rows]) + "\n", encoding="utf-8"
     )
+    delta = pf.load("linear_delta")
+    pf.save(delta.with_masses([pf.Mass(body, 0.5, (0.0, 0.0, 100.0)) for body in delta.bodies[1:]]), "delta.toml")
     for line in LINES:
         done = pfabrik(line)
         assert done.exit_code in (0, 1) and done.output, (line, done.stderr)

@@ -27,8 +27,8 @@ EXAMPLES = {
         "effort linear_delta part.gcode --torque 20 --load platform=0.5,0,0,0 -o efforts.csv --plot efforts.png",
     ),
     "identify": (
-        "identify linear_delta measured.csv --body platform",
-        "identify linear_delta measured.csv --columns t=time,effort_A1=tau1 -o identified.toml",
+        "identify delta.toml measured.csv --body platform",
+        "identify delta.toml measured.csv --columns t=time,effort_A1=tau1 -o identified.toml",
     ),
     "speed": ("speed five_bar --position 0 10 180 --speed 30", "speed stewart --speed 50 --speed BL1=20"),
     "singularities": ("singularities five_bar --position 0 30 200", "singularities five_bar --over y,z -o map.png"),
