@@ -56,7 +56,7 @@ readings, poses = measured(tilt=0.15, noise=0.01)
 poses[12, 0, 3] += 0.5
 sigma = {"position": 0.01, "orientation": 1e-4}
 spoiled = pf.calibrate(drawing, pf.Measurements(readings, pose=poses, sigma=sigma), free=everything)
-worst = spoiled.worst_rows[0]
+worst = spoiled.outliers[0]
 print(f"{worst.quantity} {worst.row}: off by {worst.residual:.1f} standard deviations")
 weights = np.ones(40)
 weights[12] = 0

@@ -289,13 +289,6 @@ class Calibration(Printed):
         return np.concatenate([right[: self._data.rank][weak], self._data.open_directions])
 
     @cached_property
-    def worst_rows(self) -> tuple[Suspect, ...]:
-        """Measurements from the worst: how far each is from what the others predict, in standard deviations."""
-        numbers, _, student, _ = self._data.left_out()
-        order = [k for k in np.argsort(-np.nan_to_num(student, nan=-1.0)) if np.isfinite(student[k])]
-        return tuple(self._suspect(int(numbers[k]), float(student[k])) for k in order)
-
-    @cached_property
     def outliers(self) -> tuple[Suspect, ...]:
         """Measurements that do not fit the others, three at most: noise alone names some in one of a hundred fits."""
         return tuple(self._suspect(number, residual) for number, residual in self._data.outliers(MOST_OUTLIERS))

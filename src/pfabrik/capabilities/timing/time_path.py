@@ -22,8 +22,8 @@ from ..dynamics.weights import lacking_masses, weights_of
 from ..statics.forces import GRAVITY
 from ..statics.loads import BodyLoads, checked_gravity
 from .curve import Curve, curve_of, refuse_crossings
+from .dwells import pieces_of, with_pauses
 from .exceeded import Limits, Timing, cells_over, exceeded, motion_at, with_exact_torques
-from .pauses import pieces_of, with_pauses
 from .timed import Timed
 from .torque_path import TorqueParts, TorquePath, TorqueSource
 

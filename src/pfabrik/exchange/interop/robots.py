@@ -23,13 +23,13 @@ from .collision import NO_COLLISION, Collision
 from .couplings import Coupling, with_coupled_drives
 from .digits import Rounding, worst
 from .driving import Rates, no_drives, with_actuators
-from .first_motion import stuck_drives
 from .imported_masses import with_masses
 from .imported_shapes import with_collision
 from .names import unique
 from .notes import Note, note_names, with_task
 from .opened import Loop, OpenMechanism
 from .simplify import merged_bodies, merged_pair, prune
+from .stuck_drives import stuck_drives
 
 PROPOSED = (1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3)
 """Values of `within` [m and rad] that are tried, where loops all but move, to propose the least that lets them."""
