@@ -28,8 +28,8 @@ READ = {
 }
 """Options with files that are read."""
 
-ELSEWHERE = {"demo -o", "export --ros2-control", "export --ros2-node"}
-"""Options with folders, whose files other tests look at one by one."""
+ELSEWHERE = {"demo -o", "export --ros2-control", "export --ros2-node", "identify -o"}
+"""Options with folders, or of much data, whose files other tests look at one by one."""
 
 LINES = (
     "new 6-UPS -o my.toml",

@@ -11,7 +11,7 @@ import numpy as np
 from ...answers.solution import Solution
 from ...common.arrays import Floats, Mask
 from ...common.batch import take
-from ...common.derived import derived
+from ...common.derived import derived, is_derived
 from ...kernels.dynamics.inverse_dynamics import inverse_dynamics
 from ...kernels.dynamics.moving import Exerted, MovingMachine, new_exerted, new_moving_scratch
 from ...kernels.handle import Handle, Scratch
@@ -71,7 +71,7 @@ class MovingRows:
         requests : of "wrenches", "resting", "matrices", "twists", "motions", with `probes` "probes" too.
         """
         mechanism, q = self.solution.mechanism, self.solution._coordinates
-        if probes is None and self.weights is own_weights(mechanism):
+        if probes is None and is_derived(own_weights, mechanism) and self.weights is own_weights(mechanism):
             machine, scratch, k = _prepared(mechanism, self.at, tuple(self.gravity.tolist()))
         else:
             machine, scratch, k = _prepare(mechanism, self.at, self.weights, self.gravity, probes or Probes())

@@ -47,6 +47,9 @@ WEIGHTLESS = 1e-3
 POINT = 1e-5
 """Radius of gyration of a point and about the line of a rod [L]: MuJoCo turns nothing without, and none sees it."""
 
+LEAST_INERTIA = 1e-14
+"""Least moment of inertia [kg m²]: MuJoCo refuses a tenth of it."""
+
 SERVO_RATE = 120.0
 """Natural frequency of the servos [1/s] where they carry all of the machine: an eighth of what one step of the
 simulation can follow. A platform that its legs hold by short levers settles tens of times more slowly."""
@@ -89,7 +92,7 @@ class Physics:
             return BodyInertia(mass, points.mean(axis=0), ball)
         _, centre, inertia = self.known[body]
         is_solid = np.linalg.eigvalsh(inertia)[0] > 0.0
-        least = 0.0 if is_solid else mass * (POINT * self.length) ** 2
+        least = 0.0 if is_solid else max(mass * (POINT * self.length) ** 2, LEAST_INERTIA)
         return BodyInertia(mass, centre * metres, inertia * metres**2 + least * np.eye(3))
 
     def carried(self, turning: bool) -> float:
