@@ -99,6 +99,9 @@ from .capabilities.workspace.singular import (
     singularity_map as singularity_map,
 )
 from .configuration import configuration as configuration
+from .exchange.contacts.grasping import grasp as grasp
+from .exchange.contacts.joining import join as join
+from .exchange.contacts.stand import stand as stand
 from .exchange.export.export_c import export_c as export_c
 from .exchange.export.ros2_control import export_ros2_control as export_ros2_control
 from .exchange.export.ros2_node import export_ros2_node as export_ros2_node

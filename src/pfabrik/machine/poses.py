@@ -140,6 +140,16 @@ def as_poses(target: Any) -> tuple[Floats, tuple[int, ...]]:
     raise InvalidArgument("target", f"shape {given.shape}", _EXPECTED)
 
 
+def one_pose(name: str, value: Any) -> Floats:
+    """An argument that is one pose (4, 4), or a position (3,) without a turn, made exact; else InvalidArgument."""
+    poses, batch = as_poses(value)
+    if batch:
+        raise InvalidArgument(name, f"shape {np.shape(value)}", "one pose of shape (4, 4), or a position of shape (3,)")
+    if not are_poses(poses)[0]:
+        raise InvalidArgument(name, what_is_wrong(poses[0]), "a pose of shape (4, 4)")
+    return np.asarray(made_exact(poses)[0])
+
+
 def are_poses(targets: Floats) -> Mask:
     """Which of (n, 4, 4) arrays are poses, (n,)."""
     from ..kernels.legs.complete_poses import are_poses as mark_poses

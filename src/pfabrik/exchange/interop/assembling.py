@@ -15,12 +15,12 @@ from ...common.arrays import Floats
 from ...common.checks import require_type
 from ...errors import Fault, InvalidMechanism, MobilityWarning
 from ...kinematics import column_joints, columns, displacements
-from ...machine.description.joints import KINDS, Joint
+from ...machine.description.joints import Joint
 from ...machine.description.mechanism import Mechanism
 from ...machine.description.structure import Structure
 from ...machine.files.units import metres_of
-from ...machine.motion.displacements import centres, screws
 from ...machine.motion.loops import loop_slopes
+from ...machine.motion.other_home import joints_at
 from ...tolerances import TOLERANCES
 from .closed_home import ClosedHome, close_home
 from .closing import CLOSED, OpenLoops
@@ -230,26 +230,8 @@ def _implied(structure: Structure, loops: OpenLoops) -> tuple[str, ...]:
 
 def closed_structure(opened: OpenMechanism, loops: OpenLoops, home: ClosedHome) -> Structure:
     """The tree's joints where they are at a closed home, then the loops as joints."""
-    joints = (*_moved_joints(opened, loops.tree, home), *_closing_joints(loops, home))
+    joints = (*joints_at(loops.tree, home.q), *_closing_joints(loops, home))
     return dataclasses.replace(loops.tree, joints=joints)
-
-
-def _moved_joints(opened: OpenMechanism, tree: Structure, home: ClosedHome) -> list[Joint]:
-    """The tree's joints where they are at the closed home, which is their home from now on."""
-    q = home.q[None]
-    points, directions, moved = centres(tree, q), screws(tree, q)[0], []
-    for joint in opened.joints:
-        span, kind = columns(tree)[joint.name], KINDS[joint.type]
-        changes: dict[str, Any] = {"at": points[joint.name][0]} if joint.at is not None else {}
-        if kind.direction == "axis":
-            changes["axis"] = directions[span][0, 3:] if joint.type == "prismatic" else directions[span][0, :3]
-        if kind.direction == "axes":
-            changes["axes"] = directions[span][:, :3]
-        if kind.ranged and home.q[span].any():
-            values = np.ravel(tree.home_coordinate(joint.name)) + home.q[span]
-            changes["home"] = values[0] if len(values) == 1 else values
-        moved.append(dataclasses.replace(joint, **changes))
-    return moved
 
 
 def _closing_joints(loops: OpenLoops, home: ClosedHome) -> list[Joint]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ...machine.description.mechanism import Mechanism
 from ...machine.motion.loops import actuated_columns, first_order, present_screws, right_singular
 from ...machine.motion.mobility import around_home
 from ...tolerances import TOLERANCES
+from ..contacts.contact import ContactType
 from .driving import candidates
 from .opened import Loop
 from .simplify import edges_between, loop_blocks
@@ -75,6 +76,8 @@ class Choice:
         The bodies that move.
     refusal : str
         Why no mechanism was made of it; empty where one was.
+    feet : mapping of str to str
+        What it stands on, of a robot on its feet, and how that touches.
     """
 
     base: str
@@ -83,14 +86,22 @@ class Choice:
     actuated: tuple[str, ...] | None = None
     moved: tuple[Moved, ...] = ()
     refusal: str = ""
+    feet: Mapping[str, ContactType] = field(default_factory=dict)
 
     def __str__(self) -> str:
+        if self.feet:
+            drives = counted(len(self.moved[0].actuators), "drive")
+            freedoms = counted(self.moved[0].freedoms, "freedom")
+            return f"stands on {', '.join(self.feet)}:\n  {self.end_effector}: {freedoms} of {drives}"
         what = f"{counted(len(self.loops), 'loop')} ({', '.join(self.loops)})" if self.loops else "the whole way"
         return "\n".join([f"against '{self.base}', {what}:", *(f"  {each}" for each in self.moved or [self.refusal])])
 
     @property
     def options(self) -> list[str]:
         """The words of the command that makes a mechanism of it; none where there is no end effector."""
+        if self.feet and self.end_effector:
+            feet = (foot if touch == "point" else f"{foot}:{touch}" for foot, touch in self.feet.items())
+            return ["--stand", ",".join(feet), "--end-effector", self.end_effector]
         drives = ["--actuated", ",".join(self.actuated)] if self.actuated else []
         return ["--base", self.base, "--end-effector", self.end_effector, *drives] if self.end_effector else []
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from ...common.arrays import Floats
 from ...machine.description.mechanism import Mass, Shape
-from .imported_masses import mass_in_unit, moved_mass
+from ...machine.description.moved_parts import moved_mass, moved_shape, plain_axes
+from .imported_masses import mass_in_unit
 
 LENGTHS = ("thickness", "ends", "at", "diameter", "size")
 """Fields of a shape that are lengths, or points."""
@@ -106,25 +107,6 @@ def shape_in_unit(shape: Shape, metres: float) -> Shape:
     lengths = {name: getattr(shape, name) for name in LENGTHS}
     changes: dict[str, Any] = {name: np.divide(value, metres) for name, value in lengths.items() if value is not None}
     return replace(shape, **changes)
-
-
-def moved_shape(shape: Shape, motion: Floats) -> Shape:
-    """A shape moved by a transform (4, 4); a capsule between joints moves with these."""
-    turn, shift = motion[:3, :3], motion[:3, 3]
-    changes: dict[str, Any] = {}
-    for name in ("at", "ends"):
-        if getattr(shape, name) is not None:
-            changes[name] = np.array(getattr(shape, name)) @ turn.T + shift
-    if shape.axis is not None:
-        changes["axis"] = turn @ shape.axis
-    if shape.kind == "box":
-        changes["axes"] = plain_axes(turn @ np.array(shape.axes or np.eye(3)[:2]).T)
-    return replace(shape, **changes)
-
-
-def plain_axes(axes: Floats) -> Floats | None:
-    """The first two edges of a box from the columns of a matrix (3, 2 or 3); None where these are x and y."""
-    return None if np.array_equal(axes[:, :2], np.eye(3)[:, :2]) else axes[:, :2].T
 
 
 def solid_shape(body: str, kind: str, size: Floats, frame: Floats) -> Shape:

@@ -26,14 +26,6 @@ def placed_mass(body: str, mass: float, frame: Floats, inertia: Floats) -> Mass:
     return Mass(body, mass, frame[:3, 3], as_moments(turn @ inertia @ turn.T))
 
 
-def moved_mass(mass: Mass, motion: Floats) -> Mass:
-    """A mass moved by a transform (4, 4)."""
-    turn, centre, moments = motion[:3, :3], mass.centre, mass.inertia
-    if centre is None or moments is None:
-        return mass
-    return Mass(mass.body, mass.mass, turn @ centre + motion[:3, 3], as_moments(turn @ as_matrix(moments) @ turn.T))
-
-
 def mass_in_unit(mass: Mass, metres: float) -> Mass:
     """A mass with lengths in a unit, from metres."""
     if mass.centre is None or mass.inertia is None:

@@ -12,8 +12,9 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...common.arguments import array
 from ...common.arrays import Floats, Ints, Mask
-from ...errors import UnknownName
+from ...errors import InvalidArgument, UnknownName
 from ...machine.description.joints import Joint
 from .couplings import Coupling
 from .digits import ModelDigits, Rounding, worst
@@ -58,9 +59,14 @@ class CompiledModel:
         self.is_slide: Mask = self.model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
         self.joint_names = [str(self.model.joint(index).name) for index in range(self.model.njnt)]
 
-    def put_configuration(self, name: str) -> None:
-        """Take "qpos0", or the configuration of a keyframe; UnknownName where there is none of this name."""
-        if name != "qpos0":
+    def put_configuration(self, name: str | ArrayLike) -> None:
+        """Take "qpos0", the configuration of a keyframe, UnknownName where there is none of this name, or (nq,)."""
+        if not isinstance(name, str):
+            qpos = array("configuration", name, "nq")
+            if qpos.shape != (self.model.nq,):
+                raise InvalidArgument("configuration", f"shape {qpos.shape}", f"qpos of shape ({self.model.nq},)")
+            self.data.qpos[:] = qpos
+        elif name != "qpos0":
             keys = [self.model.key(index).name for index in range(self.model.nkey)]
             if name not in keys:
                 raise UnknownName("configuration", name, ["qpos0", *keys])
@@ -110,7 +116,7 @@ class MjcfModel(CompiledModel):
     roundings : joint or loop -> how exactly the digits of the file place it [m, rad], of those that were read.
     """
 
-    def __init__(self, plain: ET.Element, configuration: str) -> None:
+    def __init__(self, plain: ET.Element, configuration: str | ArrayLike) -> None:
         try:
             super().__init__(ET.tostring(plain, encoding="unicode"))
         except ValueError as error:
@@ -202,13 +208,14 @@ class MjcfModel(CompiledModel):
         return found
 
     def places(self) -> dict[str, tuple[str, Floats]]:
-        """Body or site -> its body, and where it is (3,) [m]."""
+        """Body or site -> its body, and its frame (4, 4) [m]."""
         model, data = self.model, self.data
         sites = {
-            str(model.site(i).name): (self.body(model.site_bodyid[i]), data.site_xpos[i].copy())
+            str(model.site(i).name): (self.body(model.site_bodyid[i]), frame_of(data.site_xpos[i], data.site_xmat[i]))
             for i in range(model.nsite)
         }
-        return sites | {self.body(i): (self.body(i), data.xpos[i].copy()) for i in range(model.nbody)}
+        bodies = {self.body(i): frame_of(data.xpos[i], data.xmat[i]) for i in range(model.nbody)}
+        return sites | {body: (body, frame) for body, frame in bodies.items()}
 
     def joints(self, notes: list[Note]) -> Iterator[Joint]:
         """Yield every joint, between its body and the parent's; several on one body have bodies between them."""

@@ -21,7 +21,7 @@ from .mjcf_bodies import si_unit
 
 
 def qpos(
-    solution: Solution, model: object = None, qpos: ArrayLike | None = None, *, configuration: str = "qpos0"
+    solution: Solution, model: object = None, qpos: ArrayLike | None = None, *, configuration: str | ArrayLike | None = None
 ) -> Floats:
     """MuJoCo's joint positions of configurations, (..., nq) [rad, m; quaternions w, x, y, z], with the loops closed.
 
@@ -36,8 +36,10 @@ def qpos(
         The model, or the path or the text of one; default what `to_mjcf` writes.
     qpos : array (..., nq), optional
         Positions of the joints that the mechanism does not have; default the configuration's.
-    configuration : str, optional
-        The mechanism's home in that model: "qpos0", or the name of a keyframe.
+    configuration : str or array (nq,), optional
+        The mechanism's home in that model: "qpos0", the name of a keyframe, or positions. Default: the first of these
+        that has the joints where they are at home, else "qpos0". A body that floats freely in the model is put where
+        the mechanism has it.
 
     Raises
     ------

@@ -6,16 +6,20 @@ import json
 import math
 import os
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from ...common.checks import require_names
 from ...common.extras import require
 from ...machine.description.form_faults import shown
 from ...machine.description.joints import DRIVE_FIELDS, Cone
 from ...machine.description.mechanism import Mass
+from ..contacts.contact import AnyContact
 from .assembling import Imported
 from .collision import Collision
 from .driving import Rates
@@ -24,13 +28,15 @@ from .known_mjcf import MJCF
 from .mjcf_bodies import is_half, read_struts
 from .mjcf_geoms import read_collision
 from .mjcf_masses import read_masses
-from .mjcf_model import MjcfModel
+from .mjcf_model import MjcfModel, frame_of
 from .mjcf_plain import plain_model, straight_tendons, target_of, transmission_text
 from .mjcf_tendons import tendon_legs
 from .mjcf_writing import MADE_UP, NOTE, WEIGHTLESS_BODIES
 from .notes import Note, note_names, noting
 from .opened import loops_by_name
-from .robots import ImportOptions, Robot, mechanism_of
+from .robot_tree import Robot
+from .robots import ImportOptions, mechanism_of
+from .standing import posed
 from .xml_reading import fault, read_xml
 
 
@@ -41,11 +47,12 @@ def from_mjcf(
     end_effector: str | None = None,
     actuated: Iterable[str] | None = None,
     fixed: Iterable[str] = (),
-    configuration: str = "qpos0",
+    configuration: str | ArrayLike | Mapping[str, float] | None = None,
     length_unit: str = "m",
     task: Sequence[str] | None = None,
     within: float | None = None,
     leave_out: Iterable[str] = (),
+    feet: Mapping[str, AnyContact] | Sequence[str] | None = None,
 ) -> Imported:
     """The mechanism in a MuJoCo model.
 
@@ -74,8 +81,9 @@ def from_mjcf(
         the order of these.
     fixed : iterable of str, optional
         Names of joints to hold where they are.
-    configuration : str, optional
-        "qpos0", or the name of a keyframe: home.
+    configuration : str or array (nq,) or mapping of str to float, optional
+        Home: "qpos0", the name of a keyframe, MuJoCo's `qpos`, or joint -> its value [rad, m], others as in `qpos0`.
+        Default: "qpos0"; with `feet` the keyframe "home", if there is one.
     length_unit : str, optional
         The unit of the mechanism: "mm", "m", ...; a model has metres.
     task : sequence of str, optional
@@ -86,6 +94,8 @@ def from_mjcf(
         as far as the digits of the file explain.
     leave_out : iterable of str, optional
         Names of loops, and of joints that follow others, to read as if they were not bound.
+    feet : mapping of str to contact, or sequence of str, optional
+        The robot on its feet, as in `stand`; the end effector is then its trunk.
 
     Returns
     -------
@@ -111,11 +121,15 @@ def from_mjcf(
         plain = plain_model(root, notes)
         parts = [each.get("name", "") for each in root.iter() if each.tag in ("body", "joint", "freejoint")]
         require_known(root, MJCF, "mujoco", notes, {*filter(None, parts), "world"})
-        model = MjcfModel(plain, configuration)
-        robot = _robot(root, model, notes)
+        values = configuration if isinstance(configuration, Mapping) else {}
+        keys = [key.get("name") for key in root.iterfind("keyframe/key")]
+        home = "home" if feet is not None and "home" in keys else "qpos0"
+        named = home if configuration is None else "qpos0" if isinstance(configuration, Mapping) else configuration
+        model = MjcfModel(plain, named)
+        robot = posed(_robot(root, model, notes), values)
         held = [*require_names("fixed", fixed), *model.held(notes)]
         drives = None if actuated is None else require_names("actuated", actuated)
-        asked = ImportOptions(drives, length_unit, task, within)
+        asked = ImportOptions(drives, length_unit, task, within, feet)
         return mechanism_of(robot, base, end_effector, asked, notes, held, leave_out)
 
 
@@ -129,7 +143,7 @@ def _robot(root: ET.Element, model: MjcfModel, notes: list[Note]) -> Robot:
     joints, loops = list(model.joints(notes)), list(model.loops(notes))
     names = [*(part for joint in joints for part in (joint.name, *joint.connects)), *(loop.name for loop in loops)]
     legs = list(tendon_legs(model, names, notes))
-    places |= {body: (body, point) for leg in legs for body, point in leg.places.items()}
+    places |= {body: (body, frame_of(point, np.eye(3))) for leg in legs for body, point in leg.places.items()}
     joints, loops = [*joints, *(part for leg in legs for part in leg.joints)], [*loops, *(leg.end for leg in legs)]
     note_names(notes, "straight tendons are legs of a universal joint, a slide and a ball", (leg.name for leg in legs))
     taken = [*(joint.name for joint in joints), *(loop.name for loop in loops)]

@@ -144,7 +144,7 @@ def loops_by_name(
 
     Parameters
     ----------
-    places : frame -> its body, and where it is.
+    places : frame -> its body, and the frame (4, 4).
     known : loops that the file describes otherwise, active or not.
     taken : names that loops must not have.
     """
@@ -169,8 +169,8 @@ def loops_by_name(
 def _loop_between(name: str, frames: tuple[str, str], places: Mapping[str, tuple[str, Floats]]) -> Loop:
     """The loop of two frames: a hinge where both have another one along its axis, else a ball."""
     bodies = (places[frames[0]][0], places[frames[1]][0])
-    points = np.array([places[frame][1] for frame in frames])
-    ends = [places.get(f"{frame}_z", places[frame])[1] for frame in frames]
+    points = np.array([places[frame][1][:3, 3] for frame in frames])
+    ends = [places.get(f"{frame}_z", places[frame])[1][:3, 3] for frame in frames]
     axes = np.array(ends) - points
     if not np.linalg.norm(axes, axis=1).all():
         return Loop(name, "spherical", bodies, points)

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...common.arrays import Floats, Ints, Mask
 from ...common.extras import require
 from ...common.rotations import to_quaternion
 from ...errors import InvalidArgument, UnknownName
-from ...kinematics import columns
+from ...kinematics import columns, displacements, home_coordinates
 from ...machine.description.joint_coordinates import JointCoordinate
 from ...machine.description.joints import Joint
 from ...machine.description.mechanism import Mechanism
@@ -37,7 +38,7 @@ class RobotInMujoco(CompiledModel):
     Parameters
     ----------
     model : compiled, or the path or the text of one.
-    configuration : the mechanism's home in it.
+    configuration : the mechanism's home in it; None for the first of "qpos0" and the keyframes that has it.
     same_row : as of `SAME_ROW`.
     is_whole : joints that the mechanism has not, and nothing drives, move too, where that is what closes loops.
 
@@ -48,19 +49,20 @@ class RobotInMujoco(CompiledModel):
     """
 
     def __init__(
-        self, mechanism: Mechanism, model: Any, configuration: str, same_row: float = SAME_ROW, is_whole: bool = False
+        self, mechanism: Mechanism, model: Any, configuration: str | ArrayLike | None, same_row: float = SAME_ROW, is_whole: bool = False
     ) -> None:
         require("a robot in MuJoCo", "mujoco", "mujoco")
         super().__init__(_compiled(model))
-        self.put_configuration(configuration)
         self.mechanism, self.metres, self._same_row = mechanism, metres_of(mechanism.length_unit), same_row
         self._size = mechanism.characteristic_length * self.metres
-        self.begin: Floats = self.data.qpos.copy()
         self._scalars: dict[int, int] = {}
         self._places: dict[int, int] = {}
         self._balls: dict[int, tuple[slice, int]] = {}
+        self._floating: dict[int, str] = {}
         self._match()
         self._require_joints()
+        self.put_configuration(self._home_in_model() if configuration is None else configuration)
+        self.begin: Floats = self.data.qpos.copy()
         driven, joint_of = {drive.column for drive in mechanism.drives}, self.model.dof_jntid
         names = {joint.name for joint in mechanism.joints}
         known = {*self._scalars, *self._balls, *(n for n, name in enumerate(self.joint_names) if name in names)}
@@ -110,6 +112,7 @@ class RobotInMujoco(CompiledModel):
             is_inward = self.model.body(self.model.jnt_bodyid[joint]).name == coordinates[span][0].joint.connects[0]
             turn = to_quaternion(before.T @ q[span] * (-1.0 if is_inward else 1.0))
             self.mujoco.mju_mulQuat(self._quaternion(joint), np.roll(turn, 1), home)
+        self._float(q)
         self._follow()
         self.update()
 
@@ -168,9 +171,35 @@ class RobotInMujoco(CompiledModel):
                 raise InvalidArgument("model", found, "joints as the mechanism has them")
             self._places |= {spans[name].start: address + place for place, name in enumerate(slides)}
             self._balls[joint] = spans[ball.name], address + len(slides)
+        for joint in np.flatnonzero(self.model.jnt_type == kinds.mjJNT_FREE).tolist():
+            body = self.model.body(self.model.jnt_bodyid[joint]).name
+            if joint not in self._balls and body in self.mechanism.bodies:
+                self._floating[joint] = body
+
+    def _home_in_model(self) -> str:
+        """The first configuration of the model whose joints have the mechanism's values at home, else "qpos0"."""
+        names = ["qpos0", *(self.model.key(index).name for index in range(self.model.nkey))]
+        home = {n: each.home * si_unit(each, self.metres) for n, each in enumerate(self.mechanism.coordinates)}
+        for name, qpos in zip(names, [self.model.qpos0, *self.model.key_qpos], strict=True):
+            off = [qpos[address] - home[column] for column, address in self._places.items()]
+            if name and np.abs(off).max(initial=0.0) <= TOLERANCES.alignment:
+                return name
+        return "qpos0"
+
+    def _float(self, q: Floats) -> None:
+        """Put what floats freely, of which the mechanism has the body and not the joint, where it has it."""
+        if not self._floating:
+            return
+        moved = displacements(self.mechanism, (q - home_coordinates(self.mechanism))[None])
+        for joint, body in self._floating.items():
+            address, motion = int(self.model.jnt_qposadr[joint]), moved[body][0]
+            at, turn = self.begin[address : address + 3], np.empty(4)
+            self.mujoco.mju_mat2Quat(turn, np.ascontiguousarray(motion[:3, :3]).ravel())
+            self.data.qpos[address : address + 3] = motion[:3, :3] @ at + motion[:3, 3] * self.metres
+            self.mujoco.mju_mulQuat(self.data.qpos[address + 3 : address + 7], turn, self.begin[address + 3 : address + 7])
 
     def _require_joints(self) -> None:
-        """Stop where a joint has no counterpart, unless it may be one that closes a loop: of these a model has none."""
+        """Stop where a joint has no counterpart, unless it may be one that closes a loop, or holds what else floats."""
         for drive in self.mechanism.drives:
             if drive.column not in self._places:
                 raise UnknownName("actuator in the model", drive.name, self.joint_names)
@@ -180,7 +209,7 @@ class RobotInMujoco(CompiledModel):
             return joint.name in self.joint_names or all(n in self._places for n in range(span.start, span.stop))
 
         joints = [joint for joint in self.mechanism.joints if joint.type != "fixed"]
-        n_loops = len(self.mechanism.joints) - len(self.mechanism.bodies) + 1
+        n_loops = len(self.mechanism.joints) - len(self.mechanism.bodies) + 1 + len(self._floating)
         equalities = {self.model.eq(index).name for index in range(self.model.neq)}
         unknown = [joint.name for joint in joints if not is_known(joint)]
         if len(unknown) > n_loops:

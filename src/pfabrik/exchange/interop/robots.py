@@ -17,8 +17,9 @@ from ...kinematics import generic_of
 from ...machine.description.joints import KINDS, Cone, Joint
 from ...machine.description.mechanism import Mechanism
 from ...machine.files.units import metres_of
+from ..contacts.contact import AnyContact, as_contacts
 from .assembling import Imported, closed
-from .choices import Build, NoEndEffector, choices_of, enough_drives
+from .choices import Build, Choice, Moved, NoEndEffector, choices_of, enough_drives
 from .collision import NO_COLLISION, Collision
 from .couplings import Coupling, with_coupled_drives
 from .digits import Rounding, worst
@@ -27,51 +28,14 @@ from .imported_masses import with_masses
 from .imported_shapes import with_collision
 from .names import unique
 from .notes import Note, note_names, with_task
-from .opened import Loop, OpenMechanism
+from .opened import OpenMechanism
+from .robot_tree import Robot
 from .simplify import merged_bodies, merged_pair, prune
+from .standing import feet_of, standing
 from .stuck_drives import stuck_drives
 
 PROPOSED = (1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3)
 """Values of `within` [m and rad] that are tried, where loops all but move, to propose the least that lets them."""
-
-
-@dataclass(frozen=True)
-class Robot:
-    """A tree of bodies and what closes its loops, in metres and radians, in the frame of its root.
-
-    Attributes
-    ----------
-    joints : from the root outward, each from its parent to its child; bodies welded to each other have a fixed one.
-    root : the body that the others hang on.
-    places : what an end effector may be called besides a joint -> its body, and the point of it that targets place [m].
-    base, end_effector, task, cones : those of a mechanism that the file describes, if any.
-    order : coordinates that are driven, in the order of the actuators; those that are not named come behind.
-    rates : coordinate -> what its drive can do [rad or m, per s and per s^2, and SI units].
-    roundings : joint or loop -> how exactly the digits of the file place it [m, rad]; other loops are as the worst.
-    couplings : joints that follow others.
-    undriven : what the file has in place of driven joints, for the refusal of a machine without any.
-    unread : its drives that are not read, by name.
-    collision : its collision geometry [m].
-    spans : slide -> the two joints or loops whose distance is its coordinate.
-    """
-
-    name: str
-    joints: Sequence[Joint]
-    loops: Sequence[Loop]
-    root: str
-    places: Mapping[str, tuple[str, Floats]]
-    base: str | None = None
-    end_effector: str | None = None
-    task: tuple[str, ...] | None = None
-    cones: Mapping[str, Cone] = field(default_factory=dict)
-    order: Sequence[str] = ()
-    rates: Mapping[str, Rates] = field(default_factory=dict)
-    roundings: Mapping[str, Rounding] = field(default_factory=dict)
-    couplings: Sequence[Coupling] = ()
-    undriven: str = "none in the file"
-    unread: str = ""
-    spans: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    collision: Collision = NO_COLLISION
 
 
 class ImportOptions(NamedTuple):
@@ -81,6 +45,7 @@ class ImportOptions(NamedTuple):
     length_unit: str = "m"
     task: Sequence[str] | None = None
     within: float | None = None
+    feet: Mapping[str, AnyContact] | Sequence[str] | None = None
 
 
 def mechanism_of(
@@ -95,6 +60,10 @@ def mechanism_of(
     """The mechanism between the base and the end effector of a robot, its loops closed; arguments as in `from_mjcf`."""
     metres_of(asked.length_unit)
     robot = _with_drives(_with_held(_without(robot, leave_out, notes), fixed), asked.actuated)
+    if asked.feet is not None:
+        if base is not None:
+            raise InvalidArgument("base", repr(base), "none beside `feet`, which are on the ground")
+        robot, end_effector = standing(robot, as_contacts("feet", asked.feet), end_effector, notes), None
     base = _base(robot, base)
     end_effector = _end_effector(robot, end_effector, base)
     if asked.task is not None:
@@ -242,17 +211,35 @@ def _end_effector(robot: Robot, end_effector: str | None, base: str) -> str:
     if robot.end_effector is not None:
         return robot.end_effector
     rigid = _with_merged_bodies(robot, base, base)
-    raise NoEndEffector(choices_of(rigid.joints, rigid.loops, base, _build(rigid), robot.unread))
+    chains = choices_of(rigid.joints, rigid.loops, base, _build(rigid), robot.unread)
+    raise NoEndEffector([*_stances(robot), *chains])
+
+
+def _stances(robot: Robot) -> Iterator[Choice]:
+    """The robot on its feet, where it has some."""
+    feet = feet_of(robot)
+    with suppress(PfabrikError):
+        if feet:
+            plain = standing(dataclasses.replace(robot, collision=NO_COLLISION), as_contacts("feet", feet), None, [])
+            base, trunk = _base(plain, None), _end_effector(plain, None, "")
+            machine = _between(plain, base, trunk, ImportOptions(), []).mechanism
+            moved = Moved(trunk, generic_of(machine).mobility.platform, 0, machine.actuator_names)
+            yield Choice(base, (), trunk, None, (moved,), feet=feet)
 
 
 def _place(robot: Robot, end_effector: str) -> tuple[str, Floats | None]:
     """The body of an end effector and its point there [m]; of a joint that moves, its own name, and None."""
     for joint in robot.joints:
         if joint.name == end_effector and joint.type == "fixed":
-            return robot.places[joint.connects[1]]
+            return _origin(robot.places[joint.connects[1]])
     if end_effector in _bodies(robot) or end_effector not in _joint_names(robot):
-        return robot.places[end_effector]
+        return _origin(robot.places[end_effector])
     return end_effector, None
+
+
+def _origin(place: tuple[str, Floats]) -> tuple[str, Floats]:
+    """A body, and the origin (3,) of a frame of it."""
+    return place[0], place[1][:3, 3]
 
 
 def _with_merged_bodies(robot: Robot, base: str, tip: str) -> Robot:

@@ -13,16 +13,19 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from ...common.arrays import Floats
-from ...common.checks import require_names
+from ...common.checks import require_mapping, require_names
 from ...errors import Fault, InvalidMechanism
 from ...machine.description.joints import KINDS, Joint
+from ..contacts.contact import AnyContact
 from .assembling import Imported
 from .driving import Rates
 from .known_elements import SDF, URDF, note_ranges, require_known
 from .loops_file import LinkLoop, LoopsFile, placed_loops, read_loops, roundings_of_loops
 from .notes import Note, note_names, noting
 from .opened import loops_by_name
-from .robots import ImportOptions, Robot, mechanism_of
+from .robot_tree import Robot
+from .robots import ImportOptions, mechanism_of
+from .standing import posed
 from .sdf_links import Poses, closing, only_model, read_sdf, sdf_joint
 from .told_loops import DIALECTS, SPRING, attached_by, links_named, told_joint, unread_loops
 from .urdf_collision import read_collision, read_masses
@@ -45,10 +48,12 @@ def from_urdf(
     task: Sequence[str] | None = None,
     within: float | None = None,
     leave_out: Iterable[str] = (),
+    configuration: Mapping[str, float] | None = None,
+    feet: Mapping[str, AnyContact] | Sequence[str] | None = None,
 ) -> Imported:
     """The mechanism in a robot description, with the loops that URDF cannot express.
 
-    Home is the zero configuration, closed: where the description is open there, passive joints are moved until its
+    Home is the zero configuration, or that asked for, closed: where the description is open there, passive joints are moved until its
     loops meet, within their ranges. Base coordinates are those of the root link. Boxes, spheres, cylinders and capsules
     of `collision` become shapes; links that overlap at home may touch (`ignore`).
 
@@ -78,6 +83,10 @@ def from_urdf(
         As in `from_mjcf`.
     leave_out : iterable of str, optional
         As in `from_mjcf`.
+    configuration : mapping of str to float, optional
+        Home: joint -> its value [rad, m]; others are at zero.
+    feet : mapping of str to contact, or sequence of str, optional
+        As in `from_mjcf`.
 
     Returns
     -------
@@ -101,9 +110,10 @@ def from_urdf(
         asked = {*(chosen or ()), *require_names("fixed", fixed), *loops_file.actuated}
         links, link_loops = read_description(element, loops_file, asked, notes)
         solids, masses = read_collision(element, links, notes), tuple(read_masses(element, links, notes))
-        robot = replace(_robot(links, link_loops, loops_file, notes), collision=replace(solids, masses=masses))
+        whole = replace(_robot(links, link_loops, loops_file, notes), collision=replace(solids, masses=masses))
+        robot = posed(whole, require_mapping("configuration", configuration, "values by the names of joints"))
         motors = [name for name in loops_file.actuated if any(joint.name == name for joint in links.joints)] or None
-        wanted = ImportOptions(motors if chosen is None else chosen, length_unit, task, within)
+        wanted = ImportOptions(motors if chosen is None else chosen, length_unit, task, within, feet)
         return mechanism_of(robot, base, end_effector, wanted, notes, fixed, leave_out)
 
 
@@ -208,7 +218,7 @@ def _robot(links: UrdfLinks, link_loops: Sequence[LinkLoop], loops_file: LoopsFi
         unknown = tuple(name for name in said if name not in known)
         note_names(notes, f"{where}, but no joint of the robot", unknown)
     loops = placed_loops(link_loops, links.frames)
-    places = {link: (link, frame[:3, 3]) for link, frame in links.frames.items()}
+    places = {link: (link, frame) for link, frame in links.frames.items()}
     frames = {joint: places[link] for joint, link in links.frame_joints.items()} | places
     taken = [*names, *(loop.name for loop in loops)]
     return Robot(

@@ -15,6 +15,7 @@ from ...common.checks import require_mapping, require_type
 from ...common.frozen import FrozenMapping
 from ...common.printed import ResultTable
 from ...errors import Fault, InvalidArgument, InvalidMechanism, MobilityWarning, UnknownName, counted
+from ..poses import one_pose
 from .body_masses import Mass
 from .body_shapes import Shape
 from .coercion import items, numbers
@@ -22,11 +23,12 @@ from .copies import Pattern
 from .expanded import expanded
 from .faults import find_faults, joint_index
 from .form_faults import shown
-from .home_mobility import end_effector_freedom, is_held, unclear_conditions
+from .home_mobility import end_effector_freedom, is_held, unclear_conditions, universal_axes
 from .joints import JOINT_TYPES, Cone, Joint, JointType, Range, Vector, set_fields
 from .leg_joints import legs_name
 from .legs import Leg, as_legs
 from .mechanism_table import mechanism_table
+from .moved_parts import moved_joint, moved_mass, moved_shape, renamed_joint, renamed_shape, turned_task
 from .structure import Structure, as_pairs
 
 __all__ = [
@@ -378,6 +380,59 @@ class Mechanism(Structure):
             A mass that none can be, with every fault.
         """
         return self._with(masses=items(masses))
+
+    def at(
+        self, pose: ArrayLike, *, prefix: str = "", base: str | None = None, task: Sequence[str] | None = None
+    ) -> Mechanism:
+        """The machine elsewhere, under other names: to be joined with others by `join`.
+
+        Parameters
+        ----------
+        pose : array (4, 4) or (3,)
+            Where the frame in which it is described comes to be, or where its origin does [length].
+        prefix : str, optional
+            What the names of all joints and bodies but the base begin with.
+        base : str, optional
+            Another name of its base, such as that of a body of another machine on which it stands.
+        task : sequence of str, optional
+            What targets set, in the new base coordinates. Default: the same, as far as the turn leaves words for it.
+
+        Raises
+        ------
+        InvalidArgument
+            No pose, or a task that has no words there.
+        """
+        motion = one_pose("pose", pose)
+        for argument, given in (("prefix", prefix), ("base", self.base if base is None else base)):
+            require_type(argument, given, str, "a text")
+        ground = self.base if base is None else base
+
+        def joint_name(joint: str) -> str:
+            return prefix + joint
+
+        def body_name(body: str) -> str:
+            return ground if body == self.base else prefix + body
+
+        whole = (
+            dataclasses.replace(each, axes=universal_axes(self, each)) if each.type == "universal" else each
+            for each in self.joints
+        )
+        placed = (renamed_joint(moved_joint(each, motion), joint_name, body_name) for each in whole)
+        is_joint, turned = self.end_effector_is_joint, motion[:3, :3] @ self.reference_point
+        return Mechanism(
+            prefix + self.name,
+            placed,
+            joint_name(self.end_effector) if is_joint else body_name(self.end_effector),
+            None if is_joint else turned + motion[:3, 3],
+            ground,
+            self.length_unit,
+            self.angle_unit,
+            turned_task(self.task, motion[:3, :3]) if task is None else task,
+            (renamed_shape(moved_shape(each, motion), joint_name, body_name) for each in self.shapes),
+            [tuple(map(body_name, pair)) for pair in self.ignore],
+            self.clearance,
+            (dataclasses.replace(moved_mass(each, motion), body=body_name(each.body)) for each in self.masses),
+        )
 
     def _with_joints(self, joints: Iterable[Joint]) -> Mechanism:
         """A checked copy; freedoms do not depend on limits, so it does not warn of them again."""

@@ -1,0 +1,1 @@
+"""Machines that touch: feet on the ground, hands on an object, machines on each other."""
