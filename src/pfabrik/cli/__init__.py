@@ -38,6 +38,7 @@ __all__ = ["main"]
         "plot": ("show", "Draw a machine at home, or where a target takes it."),
         "view": ("show", "Show a machine in the browser: drag its target, drive its actuators, see what stops it."),
         "import": ("import_", "Turn a MuJoCo model (MJCF), a URDF or an SDF into a mechanism file."),
+        "join": ("join", "Join machines, or have arms hold an object, as one mechanism file."),
         "export": ("export", "Write a mechanism for another program."),
         "verify": ("import_", "Compare answers with those of MuJoCo."),
         "demo": ("demo", "Follow circles that leave the workspace."),

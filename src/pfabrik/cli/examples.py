@@ -46,6 +46,10 @@ EXAMPLES = {
         "import robot.xml --end-effector platform -o mine.toml",
         "import robot.xml --end-effector platform --unit mm --json",
     ),
+    "join": (
+        "join panda panda --at 0,300,0 --at 0,-300,0 --prefix left_ --prefix right_ --hold box -o two.toml",
+        "join linear_delta stewart --prefix a_ --prefix b_ --on platform --end-effector b_platform -o hybrid.toml",
+    ),
     "export": ("export stewart c -o stewart.c", "export g1_ankle --numpy ankle.py --joints pitch_joint,roll_joint"),
     "verify": ("verify stewart", "verify mine.toml --original robot.xml"),
     "demo": ("demo --quick", "demo --steps 90 -o pictures"),

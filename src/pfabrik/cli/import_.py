@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,6 +13,7 @@ import click
 
 import pfabrik as pf
 
+from ..common.cells import is_finite
 from .arguments import MECH, Finite, comma_separated, load
 from .outputs import OUTPUT, STANDARD, check_outputs, force_option, refuse_existing, whole_file
 from .printing import complain, json_option, note, print_json, printing_result
@@ -19,14 +21,19 @@ from .printing import complain, json_option, note, print_json, printing_result
 if TYPE_CHECKING:
     from ..exchange.interop import Choice, Imported
 
-DEFAULTS: tuple[object, ...] = ("qpos0", "m", (), [])
+DEFAULTS: tuple[object, ...] = ("m", (), [])
 """Values of options that need not be said."""
 
 
 @click.command("import")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--base", metavar="BODY", help="The body that rests. Default: the world, or the root link.")
-@click.option("--end-effector", metavar="NAME", help="A body, a site, or a joint. Without it: what there is.")
+@click.option("--end-effector", "--body", metavar="NAME", help="A body, a site, or a joint. Without it: what there is.")
+@click.option(
+    "--stand",
+    metavar="FOOT[:CONTACT],...",
+    help="The robot on its feet, each a point, flat, or pinned: a turn is left.",
+)
 @click.option("--loops", type=click.Path(path_type=Path), metavar="YAML", help="The loops of a URDF, and its motors.")
 @click.option(
     "--actuated", metavar="A,B,...", callback=comma_separated, help="Joints that are driven. Default: as the file says."
@@ -42,7 +49,9 @@ DEFAULTS: tuple[object, ...] = ("qpos0", "m", (), [])
     callback=comma_separated,
     help="What targets set, such as z,tilt. Default: what the end effector can do.",
 )
-@click.option("--configuration", metavar="KEY", default="qpos0", show_default=True, help="A keyframe of MuJoCo: home.")
+@click.option(
+    "--configuration", metavar="KEY", help="Home: a keyframe of MuJoCo, or JOINT=VALUE,... [deg or m] of a URDF."
+)
 @click.option("--unit", default="m", show_default=True, help="Unit of length of the mechanism.")
 @click.option("-o", "--output", default="-", help="File to write. Default: print it.", **OUTPUT)
 @force_option
@@ -53,6 +62,7 @@ def import_(file: Path, output: Path, force: bool, as_json: bool, **choices: Any
     FILE is the model. Without --end-effector, its loops are listed, with what they move, and commands to go on with.
     Of a robot, what the end effector does not depend on is left out; loops that are open are closed;
     collision geometry becomes shapes of bodies.
+    With --stand, what held the trunk goes, and the feet stay on the ground: the trunk is the end effector.
     All that is left out or changed is told on stderr, by name, with the remarks of `check` on what came out.
     """
     refuse_existing(output, force)
@@ -118,17 +128,44 @@ def as_object(model: Imported, text: str) -> dict[str, object]:
 
 
 def imported(
-    file: Path, loops: Path | None, configuration: str, unit: str, fixed: list[str] | None, **choices: Any
+    file: Path,
+    loops: Path | None,
+    configuration: str | None,
+    unit: str,
+    fixed: list[str] | None,
+    stand: str | None,
+    **choices: Any,
 ) -> Imported:
     """The mechanism in a file, whose kind follows from its first element."""
-    choices |= {"fixed": fixed or (), "length_unit": unit}
+    choices |= {"fixed": fixed or (), "length_unit": unit, "feet": None if stand is None else _feet(stand)}
     if pf.interop.kind_of(file) != "mjcf":
-        if configuration != "qpos0":
-            raise click.UsageError("--configuration: a robot description has one configuration; expected none")
-        return pf.interop.from_urdf(file, loops, **choices)
+        home = None if configuration is None else _joint_values(file, configuration)
+        return pf.interop.from_urdf(file, loops, configuration=home, **choices)
     if loops is not None:
         raise click.UsageError("--loops: a MuJoCo model tells its loops itself; expected none")
     return pf.interop.from_mjcf(file, configuration=configuration, **choices)
+
+
+def _feet(given: str) -> dict[str, str]:
+    """Contacts by the names of feet, points where nothing else is said: FL,FR or left_sole:flat."""
+    words = [word.strip().rpartition(":") for word in given.split(",") if word.strip()]
+    return {foot or touch: touch if foot else "point" for foot, _, touch in words}
+
+
+def _joint_values(file: Path, given: str) -> dict[str, float]:
+    """The values of joints of a description, in radians from degrees, slides in metres."""
+    from ..exchange.interop.xml_reading import read_xml
+
+    slides = {
+        joint.get("name") for joint in read_xml(file, "urdf", "sdf").iter("joint") if joint.get("type") == "prismatic"
+    }
+    values = {}
+    for word in given.split(","):
+        name, is_given, value = (part.strip() for part in word.partition("="))
+        if not (is_given and is_finite(value)):
+            raise click.UsageError(f"--configuration: found '{word}'; expected JOINT=VALUE [deg or m]")
+        values[name] = float(value) if name in slides else math.radians(float(value))
+    return values
 
 
 @click.command()

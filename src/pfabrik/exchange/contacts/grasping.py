@@ -8,15 +8,15 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...answers.solution import Status
+from ...answers.status import Status
 from ...common.arrays import Floats
 from ...common.checks import require_mapping, require_type
 from ...errors import InvalidArgument
 from ...ik import solve_ik
+from ...machine.description.contact import AnyContact, Contact, as_contact
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.motion.other_home import with_home
 from ...machine.poses import one_pose
-from .contact import AnyContact, as_contact
 from .joining import join
 
 Grasp: TypeAlias = AnyContact | ArrayLike | tuple[ArrayLike, AnyContact]
@@ -24,7 +24,7 @@ Grasp: TypeAlias = AnyContact | ArrayLike | tuple[ArrayLike, AnyContact]
 
 
 def grasp(
-    object: str,  # noqa: A002
+    object: str,
     holds: Mapping[str, tuple[Mechanism, Grasp]],
     *,
     at: ArrayLike | None = None,
@@ -33,7 +33,7 @@ def grasp(
 ) -> Mechanism:
     """Arms, or fingers, that hold an object, which is the end effector: a parallel mechanism.
 
-    The names of each arm's joints and bodies begin with its own and `_`, as `left_`; all stand on the base of the first.
+    Names of an arm's joints and bodies begin with its own and `_`, as `left_`; all stand on the base of the first.
 
     Parameters
     ----------
@@ -69,39 +69,36 @@ def grasp(
     place = None if at is None else one_pose("at", at)
     arms, joints, points = [], [], []
     for each, held in holds.items():
-        argument = f"holds['{each}']"
-        if not isinstance(held, tuple) or len(held) != 2:
-            raise InvalidArgument(argument, type(held).__name__, "an arm, and how it holds")
-        arm, pose, given = checked_mechanism(held[0]), *_parts(argument, held[1])
-        contact = as_contact(argument, given)
-        if pose is not None:
-            if place is None:
-                raise InvalidArgument("at", "none", f"the object's pose, in which {argument} has a pose of a hand")
-            arm = _moved(argument, arm, place @ pose)
-        arm = arm.at(np.eye(4), prefix=f"{each}_", task=arm.task)
-        hand, frame = arm.end_effector_body, np.array(arm.home_pose)
-        normal = frame[:3, :3] @ (0.0, 0.0, 1.0)
-        joint = contact.joint(f"{each}_{object}", (hand, object), frame, normal)
+        arm, frame, contact = _held(f"holds['{each}']", held, place)
+        arms.append(arm.at((0.0, 0.0, 0.0), prefix=f"{each}_"))
+        touching = (arms[-1].end_effector_body, object)
+        joints.append(contact.joint(f"{each}_{object}", touching, frame, frame[:3, 2]))
         points.append(frame[:3, :3] @ contact.at + frame[:3, 3])
-        joints.append(joint)
-        arms.append(arm if arm.base == (arms[0].base if arms else arm.base) else arm.at(np.eye(4), base=arms[0].base))
     reference = np.mean(points, axis=0) if place is None else place[:3, 3]
     called = f"{object} held by {', '.join(holds)}" if name is None else name
     return join(*arms, joints=joints, end_effector=object, reference_point=reference, task=task, name=called)
 
 
-def _parts(argument: str, given: Any) -> tuple[Floats | None, Any]:
-    """The pose of a hand in the frame of the object, if there is one, and the contact."""
+def _held(argument: str, held: Any, place: Floats | None) -> tuple[Mechanism, Floats, Contact]:
+    """An arm where it holds an object at a place, the frame (4, 4) of its hand there, and how that touches."""
+    if not isinstance(held, tuple) or len(held) != 2:
+        raise InvalidArgument(argument, type(held).__name__, "an arm, and how it holds")
+    arm, given = checked_mechanism(held[0]), held[1]
     if isinstance(given, str | Mapping):
-        return None, given
-    if isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], str | Mapping):
-        return one_pose(argument, given[0]), given[1]
-    return one_pose(argument, given), "flat"
+        return arm, np.asarray(arm.home_pose), as_contact(argument, given)
+    pose, touch = given if isinstance(given, tuple) and len(given) == 2 else (given, "flat")
+    if place is None:
+        raise InvalidArgument("at", "none", f"the object's pose, in which {argument} has a pose of a hand")
+    frame = place @ one_pose(argument, pose)
+    return _moved(argument, arm, frame), frame, as_contact(argument, touch)
 
 
 def _moved(argument: str, arm: Mechanism, target: Floats) -> Mechanism:
     """The arm with its hand at a pose, which is its home."""
     found = solve_ik(arm, target)
     if found.status is not Status.REACHED:
-        raise InvalidArgument(argument, f"a hand that its arm does not bring there: {found.reason}", "one within reach")
+        off = f"{found.position_error:.4g} {arm.length_unit} and {np.degrees(found.rotation_error):.3g} deg off"
+        raise InvalidArgument(
+            argument, f"a hand that its arm brings no nearer than {off}: {found.reason}", "one in reach"
+        )
     return with_home(arm, np.asarray(found.q))

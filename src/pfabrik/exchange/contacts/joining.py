@@ -24,8 +24,8 @@ def join(
 ) -> Mechanism:
     """Machines as one mechanism, on the base of the first.
 
-    Bodies of one name are one body: a base that `Mechanism.at` called as a body of another machine stands on it. What
-    else holds them together, such as hands on a box, are `joints`.
+    A machine stands on that base too, unless its own is called, by `Mechanism.at`, as a body of another machine: then
+    on this. What else holds them together, such as hands on a box, are `joints`.
 
     Parameters
     ----------
@@ -56,11 +56,18 @@ def join(
     for machine in machines:
         if checked_mechanism(machine).length_unit != first.length_unit:
             raise InvalidArgument("machines", f"lengths in {machine.length_unit} and {first.length_unit}", "one unit")
+    carriers = {body for machine in machines for body in machine.bodies if body != machine.base}
+    machines = tuple(
+        each if each.base in carriers or each.base == first.base else each.at((0.0, 0.0, 0.0), base=first.base)
+        for each in machines
+    )
     bases = {machine.base for machine in machines}
     counts = Counter(body for machine in machines for body in machine.bodies if body not in bases)
     twice = [body for body, count in counts.items() if count > 1]
     if twice:
-        raise InvalidArgument("machines", f"two with a body {shown(twice[0])}", "names of their own: machine.at(pose, prefix='L_')")
+        raise InvalidArgument(
+            "machines", f"two with a body {shown(twice[0])}", "names of their own: machine.at(pose, prefix='L_')"
+        )
     owner = next((each for each in machines if each.end_effector == end_effector), None)
     if owner is not None and reference_point is None and not owner.end_effector_is_joint:
         reference_point = owner.reference_point

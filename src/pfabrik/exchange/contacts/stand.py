@@ -10,13 +10,14 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ...errors import InvalidArgument
+from ...machine.description.contact import AnyContact
+from ...machine.description.form_faults import shown
 from ...machine.description.mechanism import Mechanism
 from ...machine.files import load
 from ..interop.mjcf_reading import from_mjcf
 from ..interop.own_robots import mechanism_on_feet
 from ..interop.urdf_reading import from_urdf
 from ..interop.xml_reading import read_xml
-from .contact import AnyContact
 
 
 def stand(
@@ -77,8 +78,8 @@ def stand(
     shared: dict[str, Any] = {"actuated": actuated, "fixed": fixed, "task": task, "within": within, "feet": feet}
     if isinstance(robot, Mechanism) or _is_own(robot):
         machine = robot if isinstance(robot, Mechanism) else load(robot)
-        if isinstance(at, str):
-            raise InvalidArgument("at", repr(at), "values by the names of joints")
+        if at is not None and not isinstance(at, Mapping):
+            raise InvalidArgument("at", shown(at), "values by the names of joints")
         for name, value in (("loops", loops), ("length_unit", length_unit)):
             if value is not None:
                 raise InvalidArgument(name, repr(value), "none, for a mechanism has its own")
@@ -86,7 +87,7 @@ def stand(
     shared |= {"end_effector": body, "length_unit": "m" if length_unit is None else length_unit}
     if read_xml(robot, "mjcf", "urdf", "sdf").tag != "mujoco":
         if at is not None and not isinstance(at, Mapping):
-            raise InvalidArgument("at", repr(at), "values by the names of joints, as a description has no keyframes")
+            raise InvalidArgument("at", shown(at), "values by the names of joints, as a description has no keyframes")
         return from_urdf(robot, loops, configuration=at, **shared).mechanism
     if loops is not None:
         raise InvalidArgument("loops", repr(loops), "none, for a MuJoCo model tells its own")
@@ -95,4 +96,9 @@ def stand(
 
 def _is_own(robot: str | os.PathLike[str]) -> bool:
     """True for the path of a mechanism's file, or a name of the catalogue."""
-    return not str(robot).lstrip().startswith("<") and Path(robot).suffix.lower() not in (".xml", ".mjcf", ".urdf", ".sdf")
+    return not str(robot).lstrip().startswith("<") and Path(robot).suffix.lower() not in (
+        ".xml",
+        ".mjcf",
+        ".urdf",
+        ".sdf",
+    )

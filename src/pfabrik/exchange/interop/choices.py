@@ -10,6 +10,7 @@ import numpy as np
 from ...common.arrays import Floats
 from ...errors import InvalidArgument, PfabrikError, counted
 from ...kinematics import column_joints, tree_of
+from ...machine.description.contact import ContactType
 from ...machine.description.graph import Edge, spanning_tree
 from ...machine.description.home_mobility import body_twist
 from ...machine.description.joints import Joint
@@ -17,7 +18,6 @@ from ...machine.description.mechanism import Mechanism
 from ...machine.motion.loops import actuated_columns, first_order, present_screws, right_singular
 from ...machine.motion.mobility import around_home
 from ...tolerances import TOLERANCES
-from ..contacts.contact import ContactType
 from .driving import candidates
 from .opened import Loop
 from .simplify import edges_between, loop_blocks
@@ -117,7 +117,9 @@ class NoEndEffector(InvalidArgument):
 
     def __init__(self, choices: Sequence[Choice]) -> None:
         self.choices = tuple(choices)
-        ends = [f"'{each.end_effector}' against '{each.base}'" for each in choices if each.end_effector]
+        ends = [
+            f"'{each.end_effector}' against '{each.base}'" for each in choices if each.end_effector and not each.feet
+        ]
         expected = f"what is to be moved (--end-effector), such as {', '.join(ends)}" if ends else "a body of the file"
         super().__init__("end_effector", "none", expected)
 

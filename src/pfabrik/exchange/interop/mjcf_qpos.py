@@ -21,7 +21,11 @@ from .mjcf_bodies import si_unit
 
 
 def qpos(
-    solution: Solution, model: object = None, qpos: ArrayLike | None = None, *, configuration: str | ArrayLike | None = None
+    solution: Solution,
+    model: object = None,
+    qpos: ArrayLike | None = None,
+    *,
+    configuration: str | ArrayLike | None = None,
 ) -> Floats:
     """MuJoCo's joint positions of configurations, (..., nq) [rad, m; quaternions w, x, y, z], with the loops closed.
 

@@ -16,10 +16,10 @@ from numpy.typing import ArrayLike
 
 from ...common.checks import require_names
 from ...common.extras import require
+from ...machine.description.contact import AnyContact
 from ...machine.description.form_faults import shown
 from ...machine.description.joints import DRIVE_FIELDS, Cone
 from ...machine.description.mechanism import Mass
-from ..contacts.contact import AnyContact
 from .assembling import Imported
 from .collision import Collision
 from .driving import Rates

@@ -46,9 +46,7 @@ def _as_robot(mechanism: Mechanism) -> Robot:
         mechanism.base,
         places,
         order=mechanism.actuator_names,
-        rates={
-            drive.name: Rates(**{field: drive.said(field) for field in DRIVE_FIELDS}) for drive in mechanism.drives
-        },
+        rates={drive.name: Rates(**{field: drive.said(field) for field in DRIVE_FIELDS}) for drive in mechanism.drives},
         collision=Collision(
             tuple(Solid(shape, shape.body) for shape in mechanism.shapes),
             excluded=mechanism.ignore,

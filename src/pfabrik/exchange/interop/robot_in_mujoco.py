@@ -49,7 +49,12 @@ class RobotInMujoco(CompiledModel):
     """
 
     def __init__(
-        self, mechanism: Mechanism, model: Any, configuration: str | ArrayLike | None, same_row: float = SAME_ROW, is_whole: bool = False
+        self,
+        mechanism: Mechanism,
+        model: Any,
+        configuration: str | ArrayLike | None,
+        same_row: float = SAME_ROW,
+        is_whole: bool = False,
     ) -> None:
         require("a robot in MuJoCo", "mujoco", "mujoco")
         super().__init__(_compiled(model))
@@ -178,7 +183,7 @@ class RobotInMujoco(CompiledModel):
 
     def _home_in_model(self) -> str:
         """The first configuration of the model whose joints have the mechanism's values at home, else "qpos0"."""
-        names = ["qpos0", *(self.model.key(index).name for index in range(self.model.nkey))]
+        names = ["qpos0", *(str(self.model.key(index).name) for index in range(self.model.nkey))]
         home = {n: each.home * si_unit(each, self.metres) for n, each in enumerate(self.mechanism.coordinates)}
         for name, qpos in zip(names, [self.model.qpos0, *self.model.key_qpos], strict=True):
             off = [qpos[address] - home[column] for column, address in self._places.items()]
@@ -196,7 +201,9 @@ class RobotInMujoco(CompiledModel):
             at, turn = self.begin[address : address + 3], np.empty(4)
             self.mujoco.mju_mat2Quat(turn, np.ascontiguousarray(motion[:3, :3]).ravel())
             self.data.qpos[address : address + 3] = motion[:3, :3] @ at + motion[:3, 3] * self.metres
-            self.mujoco.mju_mulQuat(self.data.qpos[address + 3 : address + 7], turn, self.begin[address + 3 : address + 7])
+            self.mujoco.mju_mulQuat(
+                self.data.qpos[address + 3 : address + 7], turn, self.begin[address + 3 : address + 7]
+            )
 
     def _require_joints(self) -> None:
         """Stop where a joint has no counterpart, unless it may be one that closes a loop, or holds what else floats."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,16 +13,16 @@ from ...common.arrays import Floats
 from ...common.checks import require_known, require_names, require_positive
 from ...errors import InvalidArgument, PfabrikError, counted
 from ...kinematics import generic_of
-from ...machine.description.joints import KINDS, Cone, Joint
+from ...machine.description.contact import AnyContact, as_contacts
+from ...machine.description.joints import KINDS, Joint
 from ...machine.description.mechanism import Mechanism
 from ...machine.files.units import metres_of
-from ..contacts.contact import AnyContact, as_contacts
 from .assembling import Imported, closed
 from .choices import Build, Choice, Moved, NoEndEffector, choices_of, enough_drives
-from .collision import NO_COLLISION, Collision
-from .couplings import Coupling, with_coupled_drives
+from .collision import NO_COLLISION
+from .couplings import with_coupled_drives
 from .digits import Rounding, worst
-from .driving import Rates, no_drives, with_actuators
+from .driving import no_drives, with_actuators
 from .imported_masses import with_masses
 from .imported_shapes import with_collision
 from .names import unique
@@ -220,7 +219,7 @@ def _stances(robot: Robot) -> Iterator[Choice]:
     feet = feet_of(robot)
     with suppress(PfabrikError):
         if feet:
-            plain = standing(dataclasses.replace(robot, collision=NO_COLLISION), as_contacts("feet", feet), None, [])
+            plain = dataclasses.replace(standing(robot, as_contacts("feet", feet), None, []), collision=NO_COLLISION)
             base, trunk = _base(plain, None), _end_effector(plain, None, "")
             machine = _between(plain, base, trunk, ImportOptions(), []).mechanism
             moved = Moved(trunk, generic_of(machine).mobility.platform, 0, machine.actuator_names)

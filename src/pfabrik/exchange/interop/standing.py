@@ -11,11 +11,11 @@ from ...common.arrays import Floats
 from ...common.checks import require_known
 from ...errors import InvalidArgument
 from ...kinematics import columns
+from ...machine.description.contact import Contact, ContactType
 from ...machine.description.joints import KINDS, Joint
 from ...machine.description.structure import Structure
 from ...machine.motion.displacements import displacements
 from ...machine.motion.other_home import joints_at
-from ..contacts.contact import Contact, ContactType
 from .couplings import Coupling
 from .digits import Rounding
 from .names import unique
@@ -93,7 +93,9 @@ def standing(robot: Robot, feet: Mapping[str, Contact], body: str | None, notes:
     end = robot.places[trunk][0]
     for foot, way in ways.items():
         if end not in way or end == way[0]:
-            raise InvalidArgument("feet", f"'{foot}', which does not hang on '{trunk}'", f"parts that move against '{trunk}'")
+            raise InvalidArgument(
+                "feet", f"'{foot}', which does not hang on '{trunk}'", f"parts that move against '{trunk}'"
+            )
     holding = {above[each].name for each in _way(end, above) if each in above}
     taken = {*(joint.name for joint in robot.joints), *(loop.name for loop in robot.loops), *robot.places}
     base = unique("ground", set(robot.places)) if end == robot.root else robot.root

@@ -15,8 +15,8 @@ import numpy as np
 from ...common.arrays import Floats
 from ...common.checks import require_mapping, require_names
 from ...errors import Fault, InvalidMechanism
+from ...machine.description.contact import AnyContact
 from ...machine.description.joints import KINDS, Joint
-from ..contacts.contact import AnyContact
 from .assembling import Imported
 from .driving import Rates
 from .known_elements import SDF, URDF, note_ranges, require_known
@@ -25,8 +25,8 @@ from .notes import Note, note_names, noting
 from .opened import loops_by_name
 from .robot_tree import Robot
 from .robots import ImportOptions, mechanism_of
-from .standing import posed
 from .sdf_links import Poses, closing, only_model, read_sdf, sdf_joint
+from .standing import posed
 from .told_loops import DIALECTS, SPRING, attached_by, links_named, told_joint, unread_loops
 from .urdf_collision import read_collision, read_masses
 from .urdf_links import MOST_FAULTS, UrdfJoint, UrdfLinks, read_links
@@ -53,9 +53,9 @@ def from_urdf(
 ) -> Imported:
     """The mechanism in a robot description, with the loops that URDF cannot express.
 
-    Home is the zero configuration, or that asked for, closed: where the description is open there, passive joints are moved until its
-    loops meet, within their ranges. Base coordinates are those of the root link. Boxes, spheres, cylinders and capsules
-    of `collision` become shapes; links that overlap at home may touch (`ignore`).
+    Home is the zero configuration, or that asked for, closed: where the description is open there, passive joints are
+    moved until its loops meet, within their ranges. Base coordinates are those of the root link. Boxes, spheres,
+    cylinders and capsules of `collision` become shapes; links that overlap at home may touch (`ignore`).
 
     Parameters
     ----------
@@ -110,7 +110,11 @@ def from_urdf(
         asked = {*(chosen or ()), *require_names("fixed", fixed), *loops_file.actuated}
         links, link_loops = read_description(element, loops_file, asked, notes)
         solids, masses = read_collision(element, links, notes), tuple(read_masses(element, links, notes))
-        whole = replace(_robot(links, link_loops, loops_file, notes), collision=replace(solids, masses=masses))
+        whole = replace(
+            _robot(links, link_loops, loops_file, notes),
+            collision=replace(solids, masses=masses),
+            order=tuple(dict.fromkeys([*links.driven, *(each.get("name", "") for each in element.iter("joint"))])),
+        )
         robot = posed(whole, require_mapping("configuration", configuration, "values by the names of joints"))
         motors = [name for name in loops_file.actuated if any(joint.name == name for joint in links.joints)] or None
         wanted = ImportOptions(motors if chosen is None else chosen, length_unit, task, within, feet)
@@ -227,7 +231,6 @@ def _robot(links: UrdfLinks, link_loops: Sequence[LinkLoop], loops_file: LoopsFi
         [*loops, *loops_by_name(frames, loops, taken, notes)],
         links.root,
         places,
-        order=links.driven,
         rates={
             joint.name: Rates(
                 joint.max_speed, joint.max_acceleration, joint.max_torque, *joint.rotor, friction=joint.friction

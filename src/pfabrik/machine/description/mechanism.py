@@ -413,11 +413,10 @@ class Mechanism(Structure):
         def body_name(body: str) -> str:
             return ground if body == self.base else prefix + body
 
-        whole = (
-            dataclasses.replace(each, axes=universal_axes(self, each)) if each.type == "universal" else each
-            for each in self.joints
+        axes = {each.name: universal_axes(self, each) for each in self.joints if each.type == "universal"}
+        placed = (
+            renamed_joint(moved_joint(each, motion, axes.get(each.name)), joint_name, body_name) for each in self.joints
         )
-        placed = (renamed_joint(moved_joint(each, motion), joint_name, body_name) for each in whole)
         is_joint, turned = self.end_effector_is_joint, motion[:3, :3] @ self.reference_point
         return Mechanism(
             prefix + self.name,

@@ -1,4 +1,4 @@
-"""Parts of a description moved by a rigid motion, and called otherwise: a machine elsewhere, a robot in another pose."""
+"""Parts of a description moved by a rigid motion, or called otherwise: of a machine elsewhere, or in another pose."""
 
 from __future__ import annotations
 
@@ -16,19 +16,29 @@ from .body_shapes import Shape
 from .joints import TASK_TURNS, Cone, Joint
 
 
-def moved_joint(joint: Joint, motion: Floats) -> Joint:
-    """A joint moved by a transform (4, 4): its centre, its axes and its cone."""
+def moved_joint(joint: Joint, motion: Floats, axes: Floats | None) -> Joint:
+    """A joint moved by a transform (4, 4): its centre, its axes and its cone.
+
+    Parameters
+    ----------
+    axes : of a universal joint, its own or the default ones, (2, 3).
+    """
     turn = motion[:3, :3]
     changes: dict[str, Any] = {}
     if joint.at is not None:
         changes["at"] = turn @ joint.at + motion[:3, 3]
     if joint.axis is not None:
         changes["axis"] = turn @ joint.axis
-    if joint.axes is not None:
-        changes["axes"] = np.array(joint.axes) @ turn.T
+    if axes is not None:
+        changes["axes"] = axes @ turn.T
     if joint.cone is not None:
-        changes["cone"] = replace(joint.cone, axis=turn @ joint.cone.axis)
+        changes["cone"] = turned_cone(joint.cone, turn)
     return replace(joint, **changes)
+
+
+def turned_cone(cone: Cone, turn: Floats) -> Cone:
+    """A cone whose axis is turned by a rotation (3, 3)."""
+    return Cone(turn @ cone.axis, cone.half_angle, cone.fixed_to)
 
 
 def moved_shape(shape: Shape, motion: Floats) -> Shape:
@@ -65,20 +75,24 @@ def moved_mass(mass: Mass, motion: Floats) -> Mass:
 
 def renamed_joint(joint: Joint, joint_name: Callable[[str], str], body_name: Callable[[str], str]) -> Joint:
     """A joint with other names of joints and of bodies; a universal joint that two hinges became has theirs."""
-    along, cone = joint.along, joint.cone
-    first, second = map(body_name, joint.connects)
+    cone = joint.cone
     return replace(
         joint,
         name="+".join(map(joint_name, joint.merged or (joint.name,))),
-        connects=(first, second),
-        along=None if along is None else tuple(map(joint_name, along)),
+        connects=_both(joint.connects, body_name),
+        along=None if joint.along is None else _both(joint.along, joint_name),
         cone=None if cone is None else Cone(cone.axis, cone.half_angle, body_name(cone.fixed_to)),
     )
 
 
+def _both(pair: tuple[str, str], name: Callable[[str], str]) -> tuple[str, str]:
+    """The names of two."""
+    return name(pair[0]), name(pair[1])
+
+
 def renamed_shape(shape: Shape, joint_name: Callable[[str], str], body_name: Callable[[str], str]) -> Shape:
     """A shape with other names of joints and of bodies."""
-    between = None if shape.between is None else tuple(map(joint_name, shape.between))
+    between = None if shape.between is None else _both(shape.between, joint_name)
     return replace(shape, body=body_name(shape.body), between=between)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ...common.arrays import Floats
 from ..description.joints import KINDS, Joint
 from ..description.mechanism import Mechanism
-from ..description.moved_parts import moved_mass, moved_shape
+from ..description.moved_parts import moved_mass, moved_shape, turned_cone
 from ..description.structure import Structure
 from .displacements import centres, columns, displacements, home_coordinates, screws
 
@@ -36,8 +36,7 @@ def joints_at(structure: Structure, q: Floats) -> list[Joint]:
             values = np.ravel(structure.home_coordinate(joint.name)) + q[span]
             changes["home"] = values[0] if len(values) == 1 else values
         if joint.cone is not None:
-            turn = bodies[joint.cone.fixed_to][0, :3, :3]
-            changes["cone"] = replace(joint.cone, axis=turn @ joint.cone.axis)
+            changes["cone"] = turned_cone(joint.cone, bodies[joint.cone.fixed_to][0, :3, :3])
         moved.append(replace(joint, **changes))
     return moved
 
@@ -47,9 +46,10 @@ def with_home(mechanism: Mechanism, q: Floats) -> Mechanism:
     deviation = q - home_coordinates(mechanism)
     bodies = {body: motion[0] for body, motion in displacements(mechanism, deviation[None]).items()}
     platform, is_joint = bodies[mechanism.end_effector_body], mechanism.end_effector_is_joint
+    reference = platform[:3, :3] @ mechanism.reference_point + platform[:3, 3]
     return mechanism._with(
         joints=tuple(joints_at(mechanism, deviation)),
-        reference_point=None if is_joint else platform[:3, :3] @ mechanism.reference_point + platform[:3, 3],
+        reference_point=None if is_joint else tuple(reference.tolist()),
         shapes=tuple(moved_shape(each, bodies[each.body]) for each in mechanism.shapes),
         masses=tuple(moved_mass(each, bodies[each.body]) for each in mechanism.masses),
     )

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from ...common.arguments import array
 from ...common.arrays import Floats
-from ...common.checks import require_choice, require_known
+from ...common.checks import require_known
 from ...errors import InvalidArgument
-from ...machine.description.form_faults import shown
-from ...machine.description.joints import Joint, JointType
+from .form_faults import shown
+from .joints import Joint, JointType
 
 ContactType: TypeAlias = Literal["point", "edge", "pinned", "flat"]
 
@@ -58,7 +58,7 @@ class Contact(NamedTuple):
         kind = JOINTS[self.type]
         at = frame[:3, :3] @ self.at + frame[:3, 3]
         axis = None if kind != "revolute" else normal if self.axis is None else frame[:3, :3] @ self.axis
-        return Joint(name, kind, connects, None if kind == "fixed" else at, axis)
+        return Joint(name, kind, connects, at, axis)
 
 
 def as_contact(argument: str, given: Any) -> Contact:
@@ -67,11 +67,15 @@ def as_contact(argument: str, given: Any) -> Contact:
     require_known(f"field of {argument}", fields, ("type", "at", "axis"))
     kind = fields.get("type")
     if not isinstance(kind, str) or kind not in JOINTS:
-        raise InvalidArgument(argument, shown(given), f"{_either(list(JOINTS))}, or a mapping with `type`, `at`, `axis`")
+        raise InvalidArgument(
+            argument, shown(given), f"{_either(list(JOINTS))}, or a mapping with `type`, `at`, `axis`"
+        )
     at = array(f"{argument}: at", fields.get("at", (0.0, 0.0, 0.0)), "3")
     axis = fields.get("axis")
     if (axis is None and kind == "edge") or (axis is not None and JOINTS[kind] != "revolute"):
-        found, expected = ("none", "the direction of the edge") if axis is None else (shown(axis), f"none, for a {kind}")
+        found, expected = (
+            ("none", "the direction of the edge") if axis is None else (shown(axis), f"none, for a {kind}")
+        )
         raise InvalidArgument(f"{argument}: axis", found, expected)
     if axis is not None:
         axis = array(f"{argument}: axis", axis, "3")

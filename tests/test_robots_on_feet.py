@@ -1,0 +1,314 @@
+"""Robots on their feet, arms on one object, machines on each other: with MuJoCo, and each arm alone, as oracles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pfabrik as pf
+from pfabrik.errors import InvalidArgument, PfabrikError, UnknownName
+from pfabrik.interop import NoEndEffector
+
+mujoco: Any = pytest.importorskip("mujoco")
+
+LEGS = {"FL": (0.2, 0.1), "FR": (0.2, -0.1), "RL": (-0.2, 0.1), "RR": (-0.2, -0.1)}
+CROUCH = {"hip": 0.0, "thigh": 0.8, "calf": -1.6}
+SOLES = {"left": 0.08, "right": -0.08}
+KNEES = {"hip_pitch": -0.4, "knee": 0.8, "ankle_pitch": -0.4}
+
+
+def dog(floats: bool = True) -> str:
+    """A quadruped as a MuJoCo model: three hinges a leg, a named ball as each foot, a keyframe in which it crouches."""
+    legs = ""
+    for name, (x, y) in LEGS.items():
+        side = 0.08 if y > 0 else -0.08
+        legs += f"""
+        <body name="{name}_hip" pos="{x} {y} 0"><inertial pos="0 0 0" mass="0.6" diaginertia="1e-3 1e-3 1e-3"/>
+          <joint name="{name}_hip_joint" axis="1 0 0" range="-1 1"/>
+          <body name="{name}_thigh" pos="0 {side} 0"><inertial pos="0 0 -0.1" mass="1" diaginertia="5e-3 5e-3 1e-3"/>
+            <joint name="{name}_thigh_joint" axis="0 1 0" range="-1.5 3.5"/>
+            <body name="{name}_calf" pos="0 0 -0.2"><inertial pos="0 0 -0.1" mass="0.2" diaginertia="1e-3 1e-3 1e-4"/>
+              <joint name="{name}_calf_joint" axis="0 1 0" range="-2.7 -0.5"/>
+              <geom name="{name}" type="sphere" size="0.02" pos="0.01 0 -0.22"/>
+            </body></body></body>"""
+    motors = "".join(
+        f'<motor name="{leg}_{part}" joint="{leg}_{part}_joint" ctrlrange="-25 25"/>' for leg in LEGS for part in CROUCH
+    )
+    free = "<freejoint/>" if floats else ""
+    qpos = " ".join(["0 0 0.3 1 0 0 0"] * floats + ["0 0.8 -1.6"] * 4)
+    return f"""<mujoco model="dog"><compiler angle="radian" autolimits="true"/>
+      <worldbody><body name="trunk" pos="0 0 0.5">{free}
+      <inertial pos="0 0 0" mass="7" diaginertia="0.1 0.1 0.02"/>{legs}
+      </body></worldbody><actuator>{motors}</actuator><keyframe><key name="home" qpos="{qpos}"/></keyframe></mujoco>"""
+
+
+BODY = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+
+
+def biped(floats: bool = False) -> str:
+    """Two legs of six hinges as a URDF, straight at zero, with a frame at each sole that leans.
+
+    With `floats`, as MuJoCo reads it with a pelvis that is free.
+    """
+    world = '<mujoco><compiler fusestatic="false"/></mujoco><link name="world"/><joint name="float" type="floating">'
+    links = [f'{world}<parent link="world"/><child link="pelvis"/></joint>'] if floats else []
+    links.append(f'<link name="pelvis">{BODY}')
+    for name, y in SOLES.items():
+        before = "pelvis"
+        for part, axis, at in (
+            ("hip_yaw", "0 0 1", f"0 {y} 0"),
+            ("hip_roll", "1 0 0", "0 0 -0.05"),
+            ("hip_pitch", "0 1 0", "0 0 -0.05"),
+            ("knee", "0 1 0", "0 0 -0.3"),
+            ("ankle_pitch", "0 1 0", "0 0 -0.3"),
+            ("ankle_roll", "1 0 0", "0 0 0"),
+            ("sole", "", "0.02 0 -0.05"),
+        ):
+            link = f"{name}_sole" if part == "sole" else f"{name}_{part}_link"
+            leaning = 'rpy="0 0.1 0"' if part == "sole" else ""
+            moves = f'<axis xyz="{axis}"/><limit lower="-1.5" upper="1.5" effort="60" velocity="5"/>' if axis else ""
+            links.append(
+                f'<link name="{link}">{BODY}<joint name="{name}_{part}" type="{"revolute" if axis else "fixed"}">'
+                f'<parent link="{before}"/><child link="{link}"/><origin xyz="{at}" {leaning}/>{moves}</joint>'
+            )
+            before = link
+    return f'<robot name="biped">{"".join(links)}</robot>'
+
+
+def states(solution: pf.Solution, model: Any, configuration: str | None = None) -> list[Any]:
+    """MuJoCo's own states of a robot at answers."""
+    found = []
+    for qpos in np.atleast_2d(pf.interop.qpos(solution, model, configuration=configuration)):
+        data = mujoco.MjData(model)
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, data)
+        found.append(data)
+    return found
+
+
+def near_home(mechanism: pf.Mechanism, count: int, far: float, turned: float = 0.3, seed: int = 0) -> Any:
+    """Targets around home (n, 4, 4), up to a share of L away."""
+    rng = np.random.default_rng(seed)
+    span = far * mechanism.characteristic_length
+    at = mechanism.home_pose[:3, 3] + rng.uniform(-span, span, (count, 3))
+    return pf.pose(at, rotvec=rng.uniform(-turned, turned, (count, 3)))
+
+
+def test_feet_stay_where_mujoco_has_them() -> None:
+    """Over 200 poses, in reach and out of it, MuJoCo's own feet do not move, and its trunk is where the answer is."""
+    machine = pf.stand(dog(), list(LEGS))
+    assert (machine.end_effector, pf.mobility(machine).platform, len(machine.actuator_names)) == ("trunk", 6, 12)
+    answers = pf.solve_ik(machine, near_home(machine, 200, 0.4))
+    assert set(answers.status) == {pf.Status.REACHED, pf.Status.PROJECTED}
+    model = mujoco.MjModel.from_xml_string(dog())
+    begin = states(pf.solve_ik(machine, machine.home_pose), model)[0]
+    np.testing.assert_allclose(begin.qpos[7:], [0.0, 0.8, -1.6] * 4, atol=1e-9)
+    for state, pose in zip(states(answers, model), answers.pose, strict=True):
+        for foot in LEGS:
+            np.testing.assert_allclose(state.geom(foot).xpos, begin.geom(foot).xpos, atol=1e-12)
+        np.testing.assert_allclose(state.body("trunk").xpos, pose[:3, 3], atol=1e-12)
+        np.testing.assert_allclose(state.body("trunk").xmat.reshape(3, 3), pose[:3, :3], atol=1e-12)
+        low, high = model.jnt_range[1:].T
+        assert (state.qpos[7:] >= low - 1e-9).all() and (state.qpos[7:] <= high + 1e-9).all()
+
+
+@pytest.mark.parametrize("contact", ["flat", "pinned", "edge"])
+def test_contacts_hold_what_they_say(contact: str) -> None:
+    """A sole keeps its place; flat its frame, pinned the vertical in it, an edge the line that it rolls about."""
+    at = np.array([0.05, 0.0, 0.0]) if contact == "edge" else np.zeros(3)
+    held: Any = {"type": "edge", "axis": (0.0, 1.0, 0.0), "at": at} if contact == "edge" else contact
+    crouched = {f"{side}_{name}": value for side in SOLES for name, value in KNEES.items()}
+    machine = pf.stand(biped(), {"left_sole": held, "right_sole": "flat"}, at=crouched)
+    answers = pf.solve_ik(machine, near_home(machine, 50, 0.05, 0.1))
+    assert (answers.status == pf.Status.REACHED).any()
+    model = mujoco.MjModel.from_xml_string(biped(floats=True))
+    before, *others = states(pf.solve_ik(machine, [machine.home_pose, *answers.pose]), model)
+    home, turns = before.body("left_sole").xmat.reshape(3, 3), []
+    for state in others:
+        frame = state.body("left_sole").xmat.reshape(3, 3)
+        np.testing.assert_allclose(
+            state.body("left_sole").xpos + frame @ at, before.body("left_sole").xpos + home @ at, atol=1e-10
+        )
+        turns.append(frame @ home.T)
+        if contact != "flat":
+            line = np.array([0.0, 0.0, 1.0]) if contact == "pinned" else home[:, 1]
+            np.testing.assert_allclose(turns[-1] @ line, line, atol=1e-10)
+    assert (np.abs(np.array(turns) - np.eye(3)).max() < 1e-10) == (contact == "flat")
+
+
+def test_one_robot_from_every_file(tmp_path: Path) -> None:
+    """A dog as a MuJoCo model, with a trunk that is free or held, and as a mechanism of ours: the same answers."""
+    machine = pf.stand(dog(), list(LEGS))
+    values = {f"{leg}_{part}_joint": value for leg in LEGS for part, value in CROUCH.items()}
+    pf.save(machine, tmp_path / "dog.toml")
+    held = pf.stand(dog(floats=False), list(LEGS), at=values)
+    targets = near_home(machine, 20, 0.1)
+    expected = pf.solve_ik(machine, targets)
+    for other in (pf.load(tmp_path / "dog.toml"), held):
+        moved = targets.copy()
+        moved[:, :3, 3] += other.home_pose[:3, 3] - machine.home_pose[:3, 3]
+        np.testing.assert_allclose(pf.solve_ik(other, moved).actuators, expected.actuators, atol=1e-7)
+
+
+def test_a_mechanism_file_of_a_robot_stands_too() -> None:
+    """A tree that is described here, on its feet at given angles, holds them where its own chains put them."""
+    joints, hips = [], {name: (1000.0 * x, 1000.0 * y) for name, (x, y) in LEGS.items()}
+    for name, (x, y) in hips.items():
+        joints += [
+            pf.Joint(
+                f"{name}_hip", "revolute", ("trunk", f"{name}1"), (x, y, 0), (1, 0, 0), actuated=True, range=(-1, 1)
+            ),
+            pf.Joint(f"{name}_thigh", "revolute", (f"{name}1", f"{name}2"), (x, y, 0), (0, 1, 0), actuated=True),
+            pf.Joint(f"{name}_calf", "revolute", (f"{name}2", f"{name}3"), (x, y, -200), (0, 1, 0), actuated=True),
+        ]
+    robot = pf.Mechanism("robot", joints, "FL3", (200, 100, -400), "trunk")
+    feet: Any = {f"{name}3": {"type": "point", "at": (0, 0, -200)} for name in LEGS if name != "FL"} | {"FL3": "point"}
+    angles = {f"{name}_{part}": CROUCH[part] for name in LEGS for part in ("thigh", "calf")}
+    machine = pf.stand(robot, feet, at=angles)
+    height = 200 * np.cos(0.8) + 200 * np.cos(0.8)
+    for name, (x, y) in hips.items():
+        np.testing.assert_allclose(machine.joint(f"{name}3_contact").at, (x, y, -height), atol=1e-9)
+    raised = pf.solve_ik(machine, machine.home_pose[:3, 3] + (0.0, 0.0, 30.0))
+    bent = np.arccos((height + 30.0) / 400.0)
+    np.testing.assert_allclose(raised.actuators, [0.0, bent, -2.0 * bent] * 4, atol=1e-9)
+
+
+def test_a_robot_is_told_what_it_stands_on() -> None:
+    """The choices of a robot that floats begin with its feet, as many as it has, and the words that put it on them."""
+    for source, read, feet, drives in (
+        (dog(), pf.interop.from_mjcf, "FL,FR,RL,RR", 12),
+        (biped(), pf.interop.from_urdf, "left_sole:flat,right_sole:flat", 12),
+    ):
+        with pytest.raises(NoEndEffector) as caught:
+            read(source)
+        first = caught.value.choices[0]
+        assert first.options[:2] == ["--stand", feet]
+        assert f"6 freedoms of {drives} drives" in str(first)
+
+
+def test_wrong_feet_are_named() -> None:
+    """What cannot be stood on, and how, is told; a part that is on no leg, one foot alone, a contact that is none."""
+    cases: list[tuple[Any, dict[str, Any], type[PfabrikError], str]] = [
+        (["nix"], {}, UnknownName, "nix"),
+        (["FL"], {}, InvalidArgument, "body: found none"),
+        (["FL", "trunk"], {}, InvalidArgument, "'trunk', which does not hang on 'trunk'"),
+        ({"FL": "flot"}, {}, InvalidArgument, r"feet\['FL'\]: found 'flot'"),
+        ({"FL": {"type": "edge"}, "FR": "point"}, {}, InvalidArgument, "axis: found none"),
+        ({"FL": {"type": "point", "axis": (0, 0, 1)}, "FR": "point"}, {}, InvalidArgument, "none, for a point"),
+        ({"FL": {"kind": "point"}}, {}, UnknownName, "kind"),
+        ([], {}, InvalidArgument, "feet"),
+        ("FL", {}, InvalidArgument, "feet"),
+        (["FL", "FR"], {"at": "nowhere"}, UnknownName, "nowhere"),
+        (["FL", "FR"], {"at": np.zeros(3)}, InvalidArgument, "qpos of shape"),
+        (["FL", "FR"], {"at": {"nix": 1.0}}, UnknownName, "nix"),
+        (["FL", "FR"], {"body": "nix"}, UnknownName, "nix"),
+    ]
+    for feet, options, error, text in cases:
+        with pytest.raises(error, match=text):
+            pf.stand(dog(), feet, **options)
+
+
+ELSEWHERE = pf.pose([30.0, -20.0, 10.0], rpy=[0.0, 0.0, 0.7])
+ASKEW = pf.pose([30.0, -20.0, 10.0], rotvec=[0.3, -0.5, 0.7])
+
+
+@pytest.mark.parametrize("name", pf.catalog())
+def test_a_machine_elsewhere_answers_as_here(name: str) -> None:
+    """Moved as a whole, a machine gives the same actuator values for targets that are moved with it."""
+    machine = pf.load(name)
+    motion = ASKEW if machine.task == machine.whole_task else ELSEWHERE
+    moved = machine.at(motion, prefix="L_")
+    assert moved.actuator_names == tuple(f"L_{each}" for each in machine.actuator_names)
+    here = near_home(machine, 5, 0.02, 0.02)
+    there = here.copy()
+    there[:, :3, 3] = here[:, :3, 3] @ motion[:3, :3].T + motion[:3, 3]
+    there[:, :3, :3] = motion[:3, :3] @ here[:, :3, :3] @ motion[:3, :3].T
+    one, other = pf.solve_ik(machine, here), pf.solve_ik(moved, there)
+    np.testing.assert_array_equal(one.status, other.status)
+    np.testing.assert_allclose(one.actuators, other.actuators, atol=1e-9 * machine.characteristic_length)
+    back = moved.at(np.linalg.inv(motion), base="again")
+    np.testing.assert_allclose(back.home_pose, machine.home_pose, atol=1e-9 * machine.characteristic_length)
+    assert back.base == "again"
+
+
+def test_a_turn_that_leaves_a_task_no_words_is_told() -> None:
+    """A task turns with its machine, from x and z to x and y; tilted askew, it has no words."""
+    quarter = np.radians(90.0)
+    machine = pf.load("five_bar")
+    flat = pf.Mechanism(machine.name, machine.joints, machine.end_effector, base=machine.base, task=("x", "z"))
+    assert flat.at(pf.pose([0.0, 0.0, 0.0], rotvec=[quarter, 0.0, 0.0])).task == ("x", "y")
+    assert flat.at(pf.pose([0.0, 0.0, 0.0], rotvec=[0.0, 0.0, quarter])).task == ("y", "z")
+    tripod = pf.load("rps")
+    assert tripod.at(ELSEWHERE).task == tripod.task == ("z", "tilt")
+    for each in (flat, tripod):
+        with pytest.raises(InvalidArgument, match="no task in base coordinates"):
+            each.at(ASKEW)
+    assert tripod.at(ASKEW, task=("x", "y", "z")).task == ("x", "y", "z")
+
+
+def test_hands_hold_a_box_where_each_arm_alone_puts_them() -> None:
+    """The box of two arms is where each arm's own kinematics, given its joints, has the hand that holds it."""
+    arm = pf.load("panda")
+    left, right = arm.at((0.0, 300.0, 0.0)), arm.at((0.0, -300.0, 0.0))
+    grips = {"left": pf.pose([0.0, 150.0, 0.0], rotvec=[0.0, 0.0, 0.3]), "right": pf.pose([0.0, -150.0, 0.0])}
+    machine = pf.grasp(
+        "box", {"left": (left, grips["left"]), "right": (right, (grips["right"], "flat"))}, at=(500.0, 0.0, 400.0)
+    )
+    counts = pf.mobility(machine)
+    assert (len(machine.actuator_names), counts.platform, counts.redundancy) == (14, 6, 8)
+    answers = pf.solve_ik(machine, near_home(machine, 30, 0.1, 0.2))
+    assert (answers.status == pf.Status.REACHED).sum() > 10
+    for side, alone in (("left", left), ("right", right)):
+        place = [machine.actuator_names.index(f"{side}_{name}") for name in alone.actuator_names]
+        hands = pf.solve_fk(alone, answers.actuators[:, place]).pose
+        np.testing.assert_allclose(hands, answers.pose @ grips[side], atol=1e-8)
+
+
+def test_fingers_touch_at_points() -> None:
+    """Arms as they are at home, touching at points of the hand: the object turns about what it is held at."""
+    arm = pf.load("panda")
+    touch: Any = {"type": "point", "at": (0.0, 0.0, 50.0)}
+    fingers: Any = {name: (arm.at((0.0, y, 0.0)), touch) for name, y in (("a", 200.0), ("b", -200.0))}
+    with pytest.warns(pf.errors.MobilityWarning, match="1 freedom at home"):
+        machine = pf.grasp("ball", fingers)
+    middle = arm.home_pose[:3, 3] + (0.0, 0.0, 50.0)
+    np.testing.assert_allclose(machine.home_pose[:3, 3], middle, atol=1e-9)
+    assert pf.mobility(machine).platform == 6
+    assert pf.mobility(machine).uncontrolled == 1  # about the line of both
+
+
+def test_a_machine_on_another() -> None:
+    """A hexapod on a delta's platform is where both alone put it, one after the other."""
+    low, high = pf.load("linear_delta"), pf.load("stewart")
+    seat = low.home_pose[:3, 3]
+    machine = pf.join(low, high.at(seat, prefix="h_", base=low.end_effector), end_effector="h_platform")
+    answers = pf.solve_ik(machine, near_home(machine, 5, 0.03, 0.05))
+    assert (answers.status == pf.Status.REACHED).all()
+    below = pf.solve_fk(low, answers.actuators[:, :3]).pose[:, :3, 3]
+    above = pf.solve_fk(high, answers.actuators[:, 3:]).pose
+    np.testing.assert_allclose(above[:, :3, 3] + below, answers.pose[:, :3, 3], atol=1e-7)
+    np.testing.assert_allclose(above[:, :3, :3], answers.pose[:, :3, :3], atol=1e-9)
+
+
+def test_wrong_joins_are_named() -> None:
+    """Names that two machines have, units that differ, hands without a place or out of reach are told."""
+    arm = pf.load("panda")
+    far = pf.pose([0.0, 0.0, 0.0])
+    cases: list[tuple[Any, str]] = [
+        (lambda: pf.join(end_effector="a"), "one or more mechanisms"),
+        (lambda: pf.join(arm, arm, end_effector="flange"), "names of their own"),
+        (lambda: pf.join(arm, pf.load("rpr"), end_effector="flange"), "one unit"),
+        (lambda: pf.grasp("box", {}), "an arm and how it holds"),
+        (lambda: pf.grasp("box", {"a": (arm, far)}), "the object's pose"),
+        (lambda: pf.grasp("box", {"a": (arm, far)}, at=(9000.0, 0.0, 0.0)), "brings no nearer than"),
+        (lambda: pf.grasp("box", {"a": (arm, "glue")}), "found 'glue'"),
+        (lambda: pf.grasp("box", {"a": arm}), "an arm, and how it holds"),  # type: ignore[dict-item]
+        (lambda: arm.at(np.zeros((4, 4))), "pose"),
+        (lambda: arm.at((0.0, 0.0, 0.0), prefix=3), "prefix"),  # type: ignore[arg-type]
+    ]
+    for call, text in cases:
+        with pytest.raises(InvalidArgument, match=text):
+            call()
