@@ -7,6 +7,7 @@
     fk = pf.solve_fk(m, sol.actuators)           # from actuator values to the pose
 
 Describe   load, save, catalog; Mechanism, Joint, Cone, Leg, Shape, Mass
+           stand (a robot on its feet), grasp (hands on an object), join (machines as one)
 Ask        solve_ik, solve_fk, track, configuration, travel; assembly_modes, working_modes; pose, Options
            Solver (one machine, asked again and again), Live (one that follows any stream); sweep (millions, into files)
 Answers    Solution, Status, Track, Travel, ActiveLimit; margins, closure_residual

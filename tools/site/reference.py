@@ -40,7 +40,7 @@ PAGES = {
         "Machines",
         "A machine is a `Mechanism`: joints between bodies, read from a file by `load`, or made of joints or legs "
         "in Python. It never changes; methods with `with_` in their names return another one.",
-        "Mechanism Joint Cone Leg Shape Mass load save catalog decompose SubChain",
+        "Mechanism Joint Cone Leg Shape Mass load save catalog decompose SubChain stand grasp join",
         "machine.description.joint_coordinates.JointCoordinate machine.decomposition.decompose.Split "
         "machine.decomposition.positions.Parallelogram",
     ),
