@@ -77,7 +77,7 @@ for state in states:
     data.qpos[:] = state
     mujoco.mj_kinematics(model, data)
     feet.append([data.geom(name).xpos.copy() for name in LEGS])
-print("feet move by less than 1e-12 m:", bool(np.ptp(feet, axis=0).max() < 1e-12))
+print("feet move by < 1e-12 m:", bool(np.ptp(feet, axis=0).max() < 1e-12))
 
 figure, axes = plt.subplots(1, 2, figsize=(8.0, 3.2), layout="constrained", width_ratios=(1.0, 1.3))
 pf.plot(leaning, ax=axes[0])

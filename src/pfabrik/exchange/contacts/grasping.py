@@ -13,13 +13,13 @@ from ...common.arrays import Floats
 from ...common.checks import require_mapping, require_type
 from ...errors import InvalidArgument
 from ...ik import solve_ik
-from ...machine.description.contact import AnyContact, Contact, as_contact
+from ...machine.description.contact import Contact, ContactLike, as_contact
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.motion.other_home import with_home
 from ...machine.poses import one_pose
 from .joining import join
 
-Grasp: TypeAlias = AnyContact | ArrayLike | tuple[ArrayLike, AnyContact]
+Grasp: TypeAlias = ContactLike | ArrayLike | tuple[ArrayLike, ContactLike]
 """How a hand holds: a contact where the arm is at home, or the hand's pose in the object's frame, or both."""
 
 
@@ -33,6 +33,7 @@ def grasp(
 ) -> Mechanism:
     """Arms, or fingers, that hold an object, which is the end effector: a parallel mechanism.
 
+    Poses of the object, as of every end effector, have no rotation at home, whatever that of `at`.
     Names of an arm's joints and bodies begin with its own and `_`, as `left_`; all stand on the base of the first.
 
     Parameters
@@ -57,11 +58,6 @@ def grasp(
         A hold that is none, a pose of a hand without `at`, or one that its arm does not reach, with how far off.
     InvalidMechanism
         What comes out is no mechanism, with every fault.
-
-    Notes
-    -----
-    Poses of the object are as at home unturned, as those of every end effector: a target of `at` is its home pose where
-    `at` has no rotation.
     """
     require_type("object", object, str, "a name")
     if not require_mapping("holds", holds, "arms and grasps by name"):

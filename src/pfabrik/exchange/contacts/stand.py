@@ -10,7 +10,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ...errors import InvalidArgument
-from ...machine.description.contact import AnyContact
+from ...machine.description.contact import ContactLike
 from ...machine.description.form_faults import shown
 from ...machine.description.mechanism import Mechanism
 from ...machine.files import load
@@ -22,11 +22,11 @@ from ..interop.xml_reading import read_xml
 
 def stand(
     robot: str | os.PathLike[str] | Mechanism,
-    feet: Mapping[str, AnyContact] | Sequence[str],
+    feet: Mapping[str, ContactLike] | Sequence[str],
     *,
     body: str | None = None,
     at: str | ArrayLike | Mapping[str, float] | None = None,
-    loops: str | os.PathLike[str] | Mapping[str, Any] | None = None,
+    loops: str | os.PathLike[str] | Mapping[str, object] | None = None,
     actuated: Iterable[str] | None = None,
     fixed: Iterable[str] = (),
     length_unit: str | None = None,
@@ -43,7 +43,7 @@ def stand(
     ----------
     robot : str or PathLike or Mechanism
         A MuJoCo model, a URDF or an SDF, its path or its text, or a mechanism, or the path of its file.
-    feet : mapping of str to contact, or sequence of str
+    feet : mapping of str to str or sequence of str
         Body, link, site or named geom -> how it touches: "point" (its origin, or the middle of a geom, stays and turns
         freely), "flat" (it stays as it is), "pinned" (it turns about the vertical), or a mapping with `type`, `at`
         (where, in the part's own frame), and `axis` (of "edge", about which it rolls, or of "pinned"). Names alone
@@ -53,7 +53,7 @@ def stand(
     at : str or array (nq,) or mapping of str to float, optional
         Home: the name of a keyframe or `qpos` of a MuJoCo model; or joint -> its value [rad, m; of a mechanism in its
         unit]. Default: the keyframe "home" if there is one, else as the file has it.
-    loops : optional
+    loops : str or PathLike or mapping, optional
         As in `interop.from_urdf`.
     actuated : iterable of str, optional
         As in `interop.from_mjcf`. Default: as the file says; where it drives no joint of a leg, all of them.

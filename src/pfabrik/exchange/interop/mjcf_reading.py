@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from ...common.checks import require_names
 from ...common.extras import require
-from ...machine.description.contact import AnyContact
+from ...machine.description.contact import ContactLike
 from ...machine.description.form_faults import shown
 from ...machine.description.joints import DRIVE_FIELDS, Cone
 from ...machine.description.mechanism import Mass
@@ -52,7 +52,7 @@ def from_mjcf(
     task: Sequence[str] | None = None,
     within: float | None = None,
     leave_out: Iterable[str] = (),
-    feet: Mapping[str, AnyContact] | Sequence[str] | None = None,
+    feet: Mapping[str, ContactLike] | Sequence[str] | None = None,
 ) -> Imported:
     """The mechanism in a MuJoCo model.
 
@@ -94,7 +94,7 @@ def from_mjcf(
         as far as the digits of the file explain.
     leave_out : iterable of str, optional
         Names of loops, and of joints that follow others, to read as if they were not bound.
-    feet : mapping of str to contact, or sequence of str, optional
+    feet : mapping of str to str or sequence of str, optional
         The robot on its feet, as in `stand`; the end effector is then its trunk.
 
     Returns

@@ -13,7 +13,7 @@ from ...common.arrays import Floats
 from ...common.checks import require_known, require_names, require_positive
 from ...errors import InvalidArgument, PfabrikError, counted
 from ...kinematics import generic_of
-from ...machine.description.contact import AnyContact, as_contacts
+from ...machine.description.contact import ContactLike, as_contacts
 from ...machine.description.joints import KINDS, Joint
 from ...machine.description.mechanism import Mechanism
 from ...machine.files.units import metres_of
@@ -44,7 +44,7 @@ class ImportOptions(NamedTuple):
     length_unit: str = "m"
     task: Sequence[str] | None = None
     within: float | None = None
-    feet: Mapping[str, AnyContact] | Sequence[str] | None = None
+    feet: Mapping[str, ContactLike] | Sequence[str] | None = None
 
 
 def mechanism_of(

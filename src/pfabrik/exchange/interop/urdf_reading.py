@@ -15,7 +15,7 @@ import numpy as np
 from ...common.arrays import Floats
 from ...common.checks import require_mapping, require_names
 from ...errors import Fault, InvalidMechanism
-from ...machine.description.contact import AnyContact
+from ...machine.description.contact import ContactLike
 from ...machine.description.joints import KINDS, Joint
 from .assembling import Imported
 from .driving import Rates
@@ -49,7 +49,7 @@ def from_urdf(
     within: float | None = None,
     leave_out: Iterable[str] = (),
     configuration: Mapping[str, float] | None = None,
-    feet: Mapping[str, AnyContact] | Sequence[str] | None = None,
+    feet: Mapping[str, ContactLike] | Sequence[str] | None = None,
 ) -> Imported:
     """The mechanism in a robot description, with the loops that URDF cannot express.
 
@@ -85,7 +85,7 @@ def from_urdf(
         As in `from_mjcf`.
     configuration : mapping of str to float, optional
         Home: joint -> its value [rad, m]; others are at zero.
-    feet : mapping of str to contact, or sequence of str, optional
+    feet : mapping of str to str or sequence of str, optional
         As in `from_mjcf`.
 
     Returns

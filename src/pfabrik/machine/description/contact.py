@@ -30,7 +30,7 @@ class ContactFields(TypedDict, total=False):
     axis: ArrayLike
 
 
-AnyContact: TypeAlias = ContactType | ContactFields
+ContactLike: TypeAlias = ContactType | ContactFields
 
 
 class Contact(NamedTuple):
