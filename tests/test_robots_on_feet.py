@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pfabrik as pf
+from command import pfabrik
 from pfabrik.errors import InvalidArgument, PfabrikError, UnknownName
 from pfabrik.interop import NoEndEffector
 
@@ -187,6 +188,51 @@ def test_a_robot_is_told_what_it_stands_on() -> None:
         first = caught.value.choices[0]
         assert first.options[:2] == ["--stand", feet]
         assert f"6 freedoms of {drives} drives" in str(first)
+
+
+def test_the_commands_stand_follow_and_write_states(folder: Path) -> None:
+    """From a robot's file to a table of its joint positions: a line of names, and a row for each target."""
+    (folder / "dog.xml").write_text(dog())
+    (folder / "path.csv").write_text("x,y,z\n0,0,0.3\n0.02,0,0.28\n")
+    assert pfabrik("import dog.xml --stand FL,FR,RL,RR --body trunk -o dog.toml").exit_code == 0
+    assert pfabrik("track dog.toml path.csv --qpos dog.xml -o states.csv").exit_code == 0
+    names, *rows = (folder / "states.csv").read_text().splitlines()
+    model = mujoco.MjModel.from_xml_string(dog())
+    assert names.split(",")[:8] == [f"trunk_{each}" for each in ("x", "y", "z", "qw", "qx", "qy", "qz")] + [
+        "FL_hip_joint"
+    ]
+    machine = pf.load("dog.toml")
+    expected = pf.interop.qpos(pf.track(machine, [[0.0, 0.0, 0.3], [0.02, 0.0, 0.28]]), model)
+    np.testing.assert_allclose([list(map(float, row.split(","))) for row in rows], expected, atol=1e-9)
+    assert pfabrik("track dog.toml path.csv --qpos dog.xml").exit_code == 2
+
+
+def test_angles_of_a_description_are_degrees_at_the_command(folder: Path) -> None:
+    (folder / "biped.urdf").write_text(biped())
+    knees = ",".join(f"{side}_{name}={np.degrees(value)}" for side in SOLES for name, value in KNEES.items())
+    line = "import biped.urdf --stand left_sole:flat,right_sole:flat -o biped.toml --configuration"
+    assert pfabrik(f"{line} {knees}").exit_code == 0
+    crouched = {f"{side}_{name}": value for side in SOLES for name, value in KNEES.items()}
+    expected = pf.stand(biped(), {"left_sole": "flat", "right_sole": "flat"}, at=crouched)
+    machine = pf.load("biped.toml")
+    assert machine.actuator_names == expected.actuator_names
+    home = pf.solve_ik(machine, machine.home_pose)
+    np.testing.assert_allclose(home.actuators, [0, 0, -0.4, 0.8, -0.4, 0] * 2, atol=1e-7)
+    assert pfabrik(f"{line} left_knee=much").exit_code == 2
+
+
+def test_two_arms_are_joined_by_a_command(folder: Path) -> None:
+    line = "join panda panda --at 0,300,0 --at 0,-300,0 --prefix left_ --prefix right_ --hold box"
+    assert pfabrik(f"{line} -o two.toml").exit_code == 0
+    arm = pf.load("panda")
+    expected = pf.grasp("box", {"left": (arm.at([0, 300, 0]), "flat"), "right": (arm.at([0, -300, 0]), "flat")})
+    machine = pf.load("two.toml")
+    np.testing.assert_allclose(machine.home_pose, expected.home_pose, atol=1e-9)
+    target = machine.home_pose[:3, 3] + (20.0, -10.0, 30.0)
+    found = [pf.solve_ik(each, target).actuators for each in (machine, expected)]
+    np.testing.assert_allclose(*found, atol=1e-7)
+    for wrong in ("--at 1,2", "--end-effector box", "--prefix a --prefix b"):
+        assert pfabrik(f"{line} {wrong} -o other.toml").exit_code == 2
 
 
 def test_wrong_feet_are_named() -> None:

@@ -37,8 +37,11 @@ from .statics import Loads, carrying, weighed
 if TYPE_CHECKING:
     from ..answers.tracked import TrackSummary
     from ..capabilities.paths import path as paths
+    from ..capabilities.paths.track_rows import TrackRows
     from ..common.arrays import Mask
+    from ..exchange.interop.qpos_rows import QposRows
 
+    Rows: TypeAlias = TrackRows | QposRows
     LimitsOf: TypeAlias = Callable[[pf.Mechanism], dict[str, Any]]
 
 
@@ -85,6 +88,9 @@ recorded = together(
 @click.argument("mech", type=MECH)
 @click.argument("path", type=click.Path(path_type=Path, allow_dash=True))
 @click.option("-o", "--output", help="CSV file to write; - prints it.", **OUTPUT)
+@click.option(
+    "--qpos", "model", type=click.Path(path_type=Path), metavar="MJCF", help="Write MuJoCo's qpos of this robot."
+)
 @projecting
 @click.option("--sample-time", type=FINITE, metavar="S", help="Time from one target to the next [s].")
 @click.option("--rapid", type=FINITE, metavar="V", help="Feed of rapid moves (G0), which say none [length/s].")
@@ -104,6 +110,7 @@ def track(
     mech: str,
     path: Path,
     output: Path | None,
+    model: Path | None,
     options: pf.Options,
     speeds: tuple[str, ...],
     is_live: bool,
@@ -129,8 +136,12 @@ def track(
     --live follows the path as a stream, a tick a target: no drive is faster than it may, every limit is kept, nothing
     leaps; out of reach, and where the path is too fast, answers lag behind. The path needs times, and drives speeds.
 
+    With --qpos the file has the joint positions of the robot that MECH was made of, a row a target.
+
     The exit code is 1 also where an actuator would have to be faster than it may.
     """
+    if model is not None and output is None:
+        raise click.UsageError("--qpos: found no file to write; expected -o beside it")
     is_drawn = picture_path is not None or film_path is not None
     refuse_both_on_stdout(output, as_json)
     if mech == str(path) == str(STANDARD):
@@ -156,7 +167,8 @@ def track(
         every = own_limits(mechanism) | limits
         policy = {name: getattr(options, name) for name in ("hold", "hold_price", "rotation_length")}
         live = pf.Live(mechanism, speed=every, **policy) if is_live else None
-        solution = follow(mechanism, blocks, options, every, handle, summary, n_targets, live)
+        rows = None if handle is None else rows_of(handle, mechanism, model)
+        solution = follow(mechanism, blocks, options, every, rows, summary, n_targets, live)
     draw(solution, picture_path, film_path, drawn)
     if as_json:
         print_json(solution.to_dict())
@@ -237,16 +249,14 @@ def follow(
     blocks: Iterable[paths.Path],
     options: pf.Options,
     limits: dict[str, float],
-    handle: TextIO | None,
+    rows: Rows | None,
     summary: TrackSummary,
     n_targets: int | None,
     live: pf.Live | None,
 ) -> pf.Track:
     """Follow a path part by part, write its rows and sum it up; the answers to the last part."""
     from ..capabilities.paths.follow import drive_parts, follow_parts
-    from ..capabilities.paths.track_rows import TrackRows
 
-    rows = None if handle is None else TrackRows(handle)
     with telling(f"tracking {counted(n_targets, 'target') if n_targets else 'targets'}") as tell:
         on_progress = None if tell is None else lambda done: tell(done, n_targets or 0)
         if live is None:
@@ -260,6 +270,17 @@ def follow(
             if rows is not None:
                 rows.write(part)
     return part.track
+
+
+def rows_of(handle: TextIO, mechanism: pf.Mechanism, model: Path | None) -> Rows:
+    """What writes the rows of a path: answers, or the states of a robot."""
+    if model is not None:
+        from ..exchange.interop.qpos_rows import QposRows
+
+        return QposRows(handle, mechanism, model)
+    from ..capabilities.paths.track_rows import TrackRows
+
+    return TrackRows(handle)
 
 
 def draw(solution: pf.Track, picture_path: Path | None, film_path: Path | None, drawn: PictureOptions) -> None:
