@@ -114,10 +114,16 @@ def forces_of(
     n, one_by_one = len(answers), range(QUESTIONS)
     rates, gains = rng.standard_normal((2, n, len(machine.actuator_names)))
     rows, move = [answers[i] for i in one_by_one], partial(pf.inverse_dynamics, at="actuators")
-    batch, one, mass = best_times(
+    solver, poses, twists = (
+        pf.Solver(machine),
+        [answers.pose[i].copy() for i in one_by_one],
+        rng.standard_normal((n, 6)),
+    )
+    batch, one, state, mass = best_times(
         runs,
         lambda: move(answers, twists=rates, accelerations=gains),
         lambda: [move(rows[i], twists=rates[i], accelerations=gains[i]) for i in one_by_one],
+        lambda: [solver.effort(poses[i], twists[i], twists[i]) for i in one_by_one],
         partial(pf.mass_matrix, answers, "actuators"),
     )
     theirs: dict[str, Any] = {}
@@ -130,4 +136,5 @@ def forces_of(
         theirs = {"baseline": said, "baseline_seconds": seconds / 1000}
     yield Row(f"{what}, forces of a motion, batch", n, batch / n, **theirs)
     yield Row(f"{what}, forces of a motion, one call", QUESTIONS, one / QUESTIONS, **theirs)
+    yield Row(f"{what}, forces of a motion, Solver.effort", QUESTIONS, state / QUESTIONS, **theirs)
     yield Row(f"{what}, mass matrix, batch", n, mass / n)

@@ -14,6 +14,7 @@ from oracles import targets_about
 from pfabrik import Options, Solver, Status
 from pfabrik.engines.engine import engine_of
 from pfabrik.errors import InvalidArgument
+from test_dynamics import motorised, weighed
 
 MACHINES = ["delta", "rps", "stewart", "five_bar", "serial_arm"]
 
@@ -187,3 +188,53 @@ def test_a_bounded_search_bounds_no_later_call() -> None:
     after = pf.solve_fk(mechanism, values)
     assert after.status == before.status == Status.PROJECTED
     np.testing.assert_array_equal(after.actuators, before.actuators)
+
+
+MOVED = ["stewart", "delta", "hexaglide", "nrpm", "rps", "five_bar", "agile_eye", "panda", "linear_delta", "canfield"]
+
+
+@pytest.mark.parametrize("name", MOVED)
+def test_efforts_of_states_are_those_of_inverse_dynamics(name: str) -> None:
+    """Within reach and out of it, at rest and moving, with what bodies carry from call to call and without."""
+    mechanism = motorised(weighed(pf.load(name)))
+    solver, random, length = Solver(mechanism), np.random.default_rng(3), mechanism.characteristic_length
+    unit = np.repeat([length, 1.0], 3)
+    own = mechanism.bodies[-1] if mechanism.bodies[-1] != mechanism.base else mechanism.bodies[0]
+    carried = {own: (0.5, np.asarray(mechanism.reference_point) + 0.1 * length)}
+    for target in [mechanism.home_pose, *targets(mechanism, 2, 0.05), *targets(mechanism, 1, 1.0)]:
+        twist, gain = random.standard_normal((2, 6)) * unit
+        for loads in (None, carried, {own: (np.array([3.0, -2.0, 1.0]), np.zeros(3))}):
+            for gravity in ((0.0, 0.0, -9.81), random.standard_normal(3)):
+                moves = {"twists": twist, "accelerations": gain, "loads": loads, "gravity": gravity}
+                efforts = solver.effort(target, twist, gain, loads=loads, gravity=gravity)
+                expected = pf.inverse_dynamics(pf.solve_ik(mechanism, target), **moves).actuators
+                np.testing.assert_allclose(efforts, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+        at_rest = pf.inverse_dynamics(pf.solve_ik(mechanism, target)).actuators
+        np.testing.assert_allclose(solver.effort(target), at_rest, rtol=1e-9, atol=1e-9 * np.abs(at_rest).max())
+        assert solver.status is pf.solve_ik(mechanism, target).status
+
+
+def test_loads_that_change_in_place_count() -> None:
+    mechanism = weighed(pf.load("delta"))
+    solver, carried = Solver(mechanism), np.zeros(3)
+    loads = {"platform": (np.array([0.0, 0.0, -1.0]), carried)}
+    before = solver.effort(mechanism.home_pose, loads=loads).copy()
+    loads["platform"][0][:] = 0.0
+    np.testing.assert_allclose(solver.effort(mechanism.home_pose, loads=loads), solver.effort(mechanism.home_pose))
+    assert np.abs(before - solver.effort(mechanism.home_pose)).max() > 0.01
+
+
+def test_efforts_refuse_what_inverse_dynamics_does() -> None:
+    mechanism = weighed(pf.load("stewart"))
+    solver, home = Solver(mechanism), mechanism.home_pose
+    with pytest.raises(InvalidArgument, match="twist"):
+        solver.effort(home, np.array([0.0, 0.0, np.nan, 0.0, 0.0, 0.0]))
+    with pytest.raises(InvalidArgument, match="acceleration"):
+        solver.effort(home, None, [1.0, 2.0])
+    with pytest.raises(pf.errors.UnknownName, match="platfrom"):
+        solver.effort(home, loads={"platfrom": (1.0, np.zeros(3))})
+    with pytest.raises(InvalidArgument, match="loads"):
+        solver.effort(home, loads=3.0)
+    assert np.isnan(solver.effort(home, np.full(6, 1e200))).all()  # forces overflow
+    with pytest.raises(InvalidArgument, match="mass"):
+        Solver(pf.load("stewart")).effort(home)

@@ -573,3 +573,50 @@ def test_a_path_goes_on_from_where_it_dwelt(row: int) -> None:
     np.testing.assert_allclose(timed.poses[-1, :3, 3], targets[-1], atol=1e-6)
     rates = np.diff(timed.actuators, axis=0) / np.diff(timed.times)[:, None]
     assert np.abs(rates).max() <= 100.0 * (1.0 + 1e-6)
+
+
+TURNED = [("stewart", 5, 400, 0.0), ("rps", 3, 300, 0.0), ("delta", 3, 200, 0.0), ("five_bar", 3, 80, 1e-3)]
+
+
+@pytest.mark.parametrize(("name", "turns", "count", "noise"), TURNED)
+def test_a_platform_keeps_its_accelerations_and_is_at_one_of_them_all_the_way(
+    name: str, turns: int, count: int, noise: float
+) -> None:
+    """By differences of poses of the actuators, three times as dense as its grid."""
+    track = wound(pf.load(name), turns, count, noise)
+    mechanism, turning = track.mechanism, 1.5
+    most = 2.0 * mechanism.characteristic_length
+    asked: dict[str, float] = {"platform_acceleration": most}
+    if name not in ("delta", "five_bar"):
+        asked["platform_angular_acceleration"] = turning
+    duration = pf.time_path(track, **asked).duration
+    timed = pf.time_path(track, **asked, rate=60_000.0 / duration)
+    assert timed.exceeded == () and timed.used.max() <= 1.001
+    assert np.mean(timed.used > 0.99) > 0.95
+    step, near = timed.times[1], np.linspace(10, len(timed.times) - 12, 3000).astype(int)
+    far = 4  # of steps as short as these, second differences would be rounding
+    begin, here, end = (
+        pf.solve_fk(mechanism, timed.actuators[near + k], start=track[timed.steps[near]]).pose for k in (-far, 0, far)
+    )
+    along = (end - 2.0 * here + begin)[:, :3, 3] / (far * step) ** 2
+    assert np.linalg.norm(along, axis=1).max() <= 1.001 * most
+    if "platform_angular_acceleration" in asked:
+        turns_of = [Rotation.from_matrix(after[:, :3, :3]) * Rotation.from_matrix(before[:, :3, :3]).inv()
+                    for before, after in ((begin, here), (here, end))]  # fmt: skip
+        change = (turns_of[1].as_rotvec() - turns_of[0].as_rotvec()) / (far * step) ** 2
+        assert np.linalg.norm(change, axis=1).max() <= 1.001 * turning
+
+
+def test_a_straight_move_takes_the_closed_form_of_its_platform_s_acceleration() -> None:
+    """From rest to rest, 2 sqrt(d / a)."""
+    mechanism = pf.load("linear_delta")
+    way = np.linspace(0.0, 30.0, 31)[:, None] * np.array([0.6, 0.0, 0.8])
+    track = pf.track(mechanism, mechanism.home_pose[:3, 3] + way)
+    timed = pf.time_path(track, platform_acceleration=500.0)
+    assert timed.duration == pytest.approx(2.0 * np.sqrt(30.0 / 500.0), rel=1e-4)
+    assert ("platform", "acceleration") in timed.held_back
+
+
+def test_a_joint_has_no_angular_acceleration() -> None:
+    with pytest.raises(InvalidArgument, match="a joint"):
+        pf.time_path(followed("five_bar", 1), platform_angular_acceleration=1.0)

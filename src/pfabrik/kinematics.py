@@ -6,7 +6,8 @@ contracts in `pyproject.toml` name the few that search or prove by the engines' 
 it is defined.
 
 Machine       model_of, Model; task_of, Task; drive_limits
-Engine        engine_of, kind_of_engine, Grower, Starts, Configurations, legs_decide, why_not_measured
+Engine        engine_of, kind_of_engine, Grower, Starts, LegsRead, Configurations, legs_decide
+              why_not_measured
 Targets       Target, as_targets, carrying_joint; POSITION_ERROR
 Shown as      readouts, readout, Readout; plane_of
 Graph         tree_of, column_joints, columns; passive_series; links_of
@@ -18,7 +19,16 @@ First order   around_home, generic_of, internal_rates, require_determined; Joint
 Varied        varied, VariedMachine, MachineAt; VariedGeometry; leg_slopes, LegSlopes
 """
 
-from .engines.engine import POSITION_ERROR, Grower, Starts, engine_of, kind_of_engine, legs_decide, why_not_measured
+from .engines.engine import (
+    POSITION_ERROR,
+    Grower,
+    LegsRead,
+    Starts,
+    engine_of,
+    kind_of_engine,
+    legs_decide,
+    why_not_measured,
+)
 from .engines.joints.configurations import Configurations
 from .engines.joints.first_order import JointRates
 from .engines.targets import Target, as_targets, carrying_joint
@@ -58,6 +68,7 @@ __all__ = [
     "JointPath",
     "JointRates",
     "LegSlopes",
+    "LegsRead",
     "MachineAt",
     "Model",
     "Readout",

@@ -1,4 +1,4 @@
-"""A solver prepared for control loops: the answers of `solve_ik` and `solve_fk`, in arrays allocated once."""
+"""A solver prepared for control loops: answers of `solve_ik` and `solve_fk`, and forces, in arrays allocated once."""
 
 from __future__ import annotations
 
@@ -7,11 +7,16 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .answers.differential import forward_jacobian, singularity
 from .answers.solution import Solution
 from .answers.start_configuration import Start, start_of
 from .answers.status import Status
+from .capabilities.dynamics.prepared_effort import PreparedEffort, twist_of
+from .capabilities.dynamics.weights import lacking_masses
+from .capabilities.statics.forces import GRAVITY
+from .capabilities.statics.loads import BodyLoads
 from .common.arguments import DOUBLE
 from .common.arrays import Floats, read_only
 from .engines.engine import engine_of
@@ -38,8 +43,8 @@ class Solver:
     that are reached in closed form allocate no arrays; others take as long as `solve_ik`.
     An instance is for one thread: make one for each.
 
-    `pose`, `actuators` and the result of `jacobian` are read-only views of the same arrays each time: the next call
-    overwrites them. Copy them to keep them, or use `solution`.
+    `pose`, `actuators` and the results of `jacobian` and `effort` are read-only views of the same arrays each time: the
+    next call overwrites them. Copy them to keep them, or use `solution`.
 
     Parameters
     ----------
@@ -93,6 +98,10 @@ class Solver:
         self._solution: Solution | None = None
         self._was_forward = False
         self._has_tilt_axis = tilt_axis(mechanism) is not None
+        self._efforts = PreparedEffort(mechanism, start)
+        self._efforts_seen = read_only(self._efforts.actuators)
+        if not lacking_masses(mechanism):
+            self._efforts.carry(None, GRAVITY)
         self._clear()
 
     def ik(self, target: Target) -> Status:
@@ -133,6 +142,43 @@ class Solver:
         copied = actuators.copy() if isinstance(actuators, np.ndarray) else actuators
         self._clear()
         return self._store(solve_fk(self.mechanism, copied, start=self._start, options=self.options), "actuators")
+
+    def effort(
+        self,
+        pose: Target,
+        twist: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        *,
+        loads: BodyLoads | None = None,
+        gravity: ArrayLike = GRAVITY,
+    ) -> Floats:
+        """Forces of the actuators at a pose that moves, (n_a,) [N m, of slides N], as `inverse_dynamics` has them.
+
+        Those at the pose that `ik` answers, whose status is `status`; NaN where `inverse_dynamics` has a reason.
+
+        Parameters
+        ----------
+        pose : array or RigidTransform or mapping
+            As the target of `ik`.
+        twist, acceleration : array (6,) or (3,), optional
+            Velocity and acceleration of the reference point, then angular ones, in the base frame [length/s, rad/s; per
+            s]; at rest by default. Arrays (6,) of float64 are the fastest.
+        loads, gravity : optional
+            As in `inverse_dynamics`; what changes from call to call is prepared anew, in about a millisecond.
+
+        Raises
+        ------
+        InvalidArgument or UnknownName
+            As in `ik` and `inverse_dynamics`.
+        """
+        moves = twist_of("twist", twist), twist_of("acceleration", acceleration)
+        efforts = self._efforts
+        efforts.carry(loads, gravity)
+        self.ik(pose)
+        is_in_place = self._solution is None and self.status is Status.REACHED
+        if not (is_in_place and efforts.at_pose(self._rows.poses[0], *moves)):
+            efforts.at(self.solution, *moves, loads, gravity)
+        return self._efforts_seen
 
     def jacobian(self) -> Floats:
         """The forward Jacobian at the last answer, (6 or 3, n_a): twist per actuator rate; see `forward_jacobian`.

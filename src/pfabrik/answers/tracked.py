@@ -207,11 +207,15 @@ class Track(Solution):
 
 def refuse_leaps(track: Track) -> None:
     """Refuse a track with steps that are not reached, or that jump."""
-    for bad, what in ((track.status != Status.REACHED, "not reached"), (track.jumps, "leaping from the one before")):
-        steps = np.flatnonzero(bad)
-        if len(steps):
-            found = f"{len(steps)} step{'s' * (len(steps) > 1)} {what}"
-            raise InvalidArgument("track", found, "a path that is reached throughout", rows=steps[:5].tolist())
+    _refuse(track.status != Status.REACHED, "not reached")
+    _refuse(track.jumps, "leaping from the one before")
+
+
+def _refuse(bad: Mask, what: str) -> None:
+    steps = np.flatnonzero(bad)
+    if len(steps):
+        found = f"{len(steps)} step{'s' * (len(steps) > 1)} {what}"
+        raise InvalidArgument("track", found, "a path that is reached throughout", rows=steps[:5].tolist())
 
 
 def _durations(steps: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from functools import partial
@@ -293,7 +294,12 @@ def draw(solution: pf.Track, picture_path: Path | None, film_path: Path | None, 
 
 
 def _limits_of(
-    speeds: tuple[str, ...], accelerations: tuple[str, ...], torques: tuple[str, ...], platform_speed: float | None
+    speeds: tuple[str, ...],
+    accelerations: tuple[str, ...],
+    torques: tuple[str, ...],
+    platform_speed: float | None,
+    platform_acceleration: float | None,
+    platform_angular_acceleration: float | None,
 ) -> LimitsOf:
     def limits_of(mechanism: pf.Mechanism) -> dict[str, Any]:
         limits = {
@@ -302,7 +308,13 @@ def _limits_of(
             "torque": by_name("--torque", torques, "actuator", actuators(mechanism), positive),
         }
         given: dict[str, Any] = {name: values for name, values in limits.items() if values}
-        return given | ({} if platform_speed is None else {"platform_speed": platform_speed})
+        turning = platform_angular_acceleration
+        of_platform = {
+            "platform_speed": platform_speed,
+            "platform_acceleration": platform_acceleration,
+            "platform_angular_acceleration": None if turning is None else math.radians(turning),
+        }
+        return given | {name: value for name, value in of_platform.items() if value is not None}
 
     return limits_of
 
@@ -324,6 +336,13 @@ limiting = together(
         "The most that an actuator exerts, likewise [N m, of slides N]. Default: the file's max_torque.",
     ),
     click.option("--platform-speed", type=FINITE, metavar="V", help="Highest speed of the reference point [length/s]."),
+    click.option("--platform-acceleration", type=FINITE, metavar="A", help="Its highest acceleration [length/s²]."),
+    click.option(
+        "--platform-angular-acceleration",
+        type=FINITE,
+        metavar="A",
+        help="Highest angular acceleration of the platform [deg/s²].",
+    ),
 )
 """Adds the limits that a path is timed within; a command gets `limits_of`, from a machine to those given."""
 

@@ -19,6 +19,7 @@ from .joints.driven_joints import DrivenJoints
 from .joints.engine_contract import Driven as Driven
 from .joints.engine_contract import Engine as Engine
 from .joints.engine_contract import Grower as Grower
+from .joints.engine_contract import LegsRead as LegsRead
 from .pose.branch import poses_decide
 from .pose.driven_legs import DrivenLegs
 from .pose.legs_engine import LegsApartByJoints, LegsEngine

@@ -10,6 +10,7 @@ from .certify.prove import prove
 from .chains.answer_chains import answer_chains, walk_chains
 from .clearance.capsules import capsule_clearance, place_ends
 from .clearance.least_clearance import least_clearance
+from .dynamics.effort_at_pose import effort_at_pose
 from .dynamics.inverse_dynamics import inverse_dynamics
 from .dynamics.moving import Exerted
 from .dynamics.signs import signs_of
@@ -94,6 +95,7 @@ KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (read_targets, tuple(_values("i F3 F3 f2"))),
     (are_poses, tuple(_values("F3 i1"))),
     (inverse_dynamics, (*_values("i i F2 F3 F2 F2 F2"), Exerted(*_values("f2 f2 f2 f2 i1 f3 f2 f3 f3 f2 f3")))),
+    (effort_at_pose, tuple(_values("i i i i i"))),
     (signs_of, tuple(_values("F2 f2"))),
     (answer_rows, (*_values("i i i F3"), Start(*_values("F3 F2 F2")), _SOLUTIONS)),
     (nearest_pose, (*_values("i i i F3 F2"), Starts(*_values("F3 F2 F2")), _SOLUTIONS, *_values("f2"))),

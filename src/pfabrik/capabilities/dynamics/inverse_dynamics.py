@@ -93,8 +93,10 @@ def inverse_dynamics(
         least, both = exerted[over] * drives.units, np.stack([-limits, limits], axis=1)
         exerted[over] = within_limits(least, found.motions[over], both)[0] / drives.units
     add_reason(reasons, ~np.isfinite(exerted).all(axis=1), TOO_LARGE)
-    for each in (exerted, found.rates, found.gains, found.signs):
-        each[has_reason(reasons)] = np.nan
+    lacking = has_reason(reasons)
+    if lacking.any():
+        for each in (exerted, found.rates, found.gains, found.signs):
+            each[lacking] = np.nan
     exerted, rates, gains = (shaped(each, shape) for each in (exerted, found.rates, found.gains))
     at_rest, reason = shaped(found.signs == 0.0, shape), in_shape(reasons, shape)
     return Efforts(exerted, rates, gains, at_rest, rows.times, is_redundant, reason, rows)
@@ -102,8 +104,11 @@ def inverse_dynamics(
 
 def reasons_of(solution: Solution, marks: Ints) -> Reasons:
     """Why rows with marks have no forces; empty where they have."""
-    reasons, gives_way = no_reasons(len(marks)), gives_way_in_words(solution.mechanism)
+    reasons = no_reasons(len(marks))
     add_reason(reasons, np.isnan(solution._coordinates).any(axis=1), NO_CONFIGURATION)
+    if not marks.any():
+        return reasons
+    gives_way = gives_way_in_words(solution.mechanism)
     of_marks = {SINGULAR: GAINS_MOTION, NOT_MADE: NEVER_MADE, FREE_PART: LEFT_FREE, NOT_HELD: gives_way}
     for mark, reason in of_marks.items():
         add_reason(reasons, (marks & mark) > 0, reason)

@@ -121,8 +121,15 @@ def axes_of(mechanism: Mechanism, at: At, poses: Floats) -> Floats:
     """The components of the end effector's twist that `at` names, at poses (n, 4, 4), (n, k, 6); those of coordinates
     are none of these."""
     if at == "task":
-        return task_of(mechanism).twists(poses)
+        task = task_of(mechanism)
+        return task.twists(poses) if task.rotations == 2 else np.repeat(_task_axes(mechanism), len(poses), axis=0)
     return np.tile(np.eye(len(twist_units(mechanism)) if at == "path" else 0, 6), (len(poses), 1, 1))
+
+
+@derived
+def _task_axes(mechanism: Mechanism) -> Floats:
+    """The components of a task that has the same at each pose, (1, k, 6)."""
+    return task_of(mechanism).twists(mechanism.home_pose[None])
 
 
 def are_lengths(mechanism: Mechanism, at: At) -> Mask:
@@ -133,12 +140,14 @@ def are_lengths(mechanism: Mechanism, at: At) -> Mask:
     return np.array([each.kind == "length" for each in drives], bool)
 
 
+@derived
 def in_lengths(mechanism: Mechanism, at: At) -> Floats:
     """Units in L of rates as they are given: of twists, of actuators, of both of a "path", or of joints."""
     if at == "path":
         return np.append(twist_units(mechanism), in_lengths(mechanism, "actuators"))
-    lengths = np.where(are_lengths(mechanism, at), mechanism.characteristic_length, 1.0)
-    return twist_units(mechanism) if at == "task" else lengths
+    if at == "task":
+        return twist_units(mechanism)
+    return np.where(are_lengths(mechanism, at), mechanism.characteristic_length, 1.0)
 
 
 def in_si(mechanism: Mechanism, at: At, matrices: Floats) -> Floats:

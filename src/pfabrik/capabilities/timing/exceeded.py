@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from ...common.arrays import Floats, Ints, Mask
 from .curve import Curve
+from .platform_path import PlatformPath
 from .timed import EXCEEDED, Exceeded, What
 from .torque_path import TorquePath
 
@@ -37,6 +39,7 @@ class Limits(NamedTuple):
     ----------
     speeds, accelerations, torques : of the actuators, (n_a,); platform : the highest speed of the reference point.
     path : the torques along the path.
+    twists : the accelerations of the platform along the path, with their limits.
     """
 
     speeds: Floats
@@ -44,13 +47,17 @@ class Limits(NamedTuple):
     platform: float
     torques: Floats
     path: TorquePath | None
+    twists: PlatformPath | None
 
     def named(self, actuators: tuple[str, ...]) -> tuple[tuple[str, What], ...]:
         """All limits, in the order of `CurveMotion.used`."""
         kinds: list[tuple[str, What]] = [*((name, "speed") for name in actuators)]
         kinds += [(name, "acceleration") for name in actuators]
         kinds += [(name, "torque") for name in (() if self.path is None else self.path.names)]
-        return (*kinds, ("platform", "speed"))
+        kinds.append(("platform", "speed"))
+        if self.twists is not None:
+            kinds += [("platform", "acceleration"), ("platform", "angular acceleration")]
+        return tuple(kinds)
 
 
 @dataclass(frozen=True)
@@ -117,27 +124,45 @@ def motion_at(curve: Curve, limits: Limits, places: Floats, speeds: Floats, push
     if limits.path is not None:
         parts = limits.path.at(places, slopes[:, :n], bends)
         shares.append(np.abs(parts.torques(speeds, pushes)) / parts.most)
-    used = np.concatenate([*shares, platform[:, None] / limits.platform], axis=1)
+    shares.append(platform[:, None] / limits.platform)
+    if limits.twists is not None:
+        shares.append(limits.twists.at(places, slopes[:, :n], bends).sizes(speeds, pushes) / limits.twists.limits)
+    used = np.concatenate(shares, axis=1)
     return CurveMotion(rates[:, :n], gains, platform, used)
 
 
-def with_exact_torques(curve: Curve, timing: Timing, limits: Limits) -> Limits:
-    """The limits with torques at as many places as splines between them need, to be exact in this motion."""
-    path = limits.path
-    if path is None:
-        return limits
-    places = 0.5 * (path.s[1:] + path.s[:-1])
-    for _ in range(DOUBLINGS):
-        finer, motion = path.with_places(places), timing.through(places)
-        slopes, bends = (curve.at(places, order)[:, : curve.n_actuators] for order in (1, 2))
-        one, other = (each.at(places, slopes, bends) for each in (path, finer))
-        off = np.abs(other.torques(*motion) - one.torques(*motion)) / other.most
-        path, at = finer, np.searchsorted(finer.s, places[off.max(axis=1) > SPLINED])
-        if not len(at):
-            break
-        places = 0.5 * np.concatenate([path.s[at] + path.s[at - 1], path.s[at + 1] + path.s[at]])
-        places.sort()
-    return limits._replace(path=path)
+P = TypeVar("P", TorquePath, PlatformPath)
+
+
+def with_exact_splines(curve: Curve, timing: Timing, limits: Limits) -> Limits:
+    """The limits with torques and twists at as many places as splines between them need, to be exact in this motion."""
+
+    def torques_off(one: TorquePath, other: TorquePath, places: Floats, *asked: Floats) -> Floats:
+        motion, parts = asked[2:], other.at(places, *asked[:2])
+        return np.abs(parts.torques(*motion) - one.at(places, *asked[:2]).torques(*motion)) / parts.most
+
+    def twists_off(one: PlatformPath, other: PlatformPath, places: Floats, *asked: Floats) -> Floats:
+        sizes = (each.at(places, *asked[:2]).sizes(*asked[2:]) for each in (one, other))
+        return np.abs(next(sizes) - next(sizes)) / other.limits
+
+    def exact(path: P, off: Callable[..., Floats]) -> P:
+        places = 0.5 * (path.s[1:] + path.s[:-1])
+        for _ in range(DOUBLINGS):
+            slopes, bends = (curve.at(places, order)[:, : curve.n_actuators] for order in (1, 2))
+            finer = path.with_places(places)
+            far = off(path, finer, places, slopes, bends, *timing.through(places)).max(axis=1) > SPLINED
+            path, at = finer, np.searchsorted(finer.s, places[far])
+            if not len(at):
+                break
+            places = 0.5 * np.concatenate([path.s[at] + path.s[at - 1], path.s[at + 1] + path.s[at]])
+            places.sort()
+        return path
+
+    path, twists = limits.path, limits.twists
+    return limits._replace(
+        path=None if path is None else exact(path, torques_off),
+        twists=None if twists is None else exact(twists, twists_off),
+    )
 
 
 def cells_over(curve: Curve, timing: Timing, limits: Limits, before: Timing | None = None) -> Mask:

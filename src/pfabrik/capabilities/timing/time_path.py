@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,7 @@ from ...errors import InvalidArgument
 from ...fk import solve_fk
 from ...kernels.timing import acceleration_shares, fastest, speed_shares
 from ...kinematics import actuator_units, drive_limits, readouts
+from ...machine.description.mechanism import Mechanism
 from ...tolerances import TOLERANCES
 from ..dynamics.moving_rows import MovingRows
 from ..dynamics.weights import lacking_masses, weights_of
@@ -23,7 +25,8 @@ from ..statics.forces import GRAVITY
 from ..statics.loads import BodyLoads, checked_gravity
 from .curve import Curve, curve_of, refuse_crossings
 from .dwells import pieces_of, with_pauses
-from .exceeded import Limits, Timing, cells_over, exceeded, motion_at, with_exact_torques
+from .exceeded import Limits, Timing, cells_over, exceeded, motion_at, with_exact_splines
+from .platform_path import PlatformPath, PlatformRows, beside
 from .timed import Timed
 from .torque_path import TorqueParts, TorquePath, TorqueSource
 
@@ -36,6 +39,9 @@ REFINEMENTS = 12
 """Largest number of times that the grid is refined where torques exceed their limits between its points; usually six
 suffice for a path of minutes."""
 
+ROUND = 1e-4
+"""Share of a platform's acceleration up to which directions in which it is limited are as good as all."""
+
 ROUNDS = 8
 """Largest number of passes that slow down cells of the grid in which an acceleration exceeds its limit; usually three
 suffice."""
@@ -47,6 +53,8 @@ def time_path(
     speed: float | Mapping[str, float] | None = None,
     acceleration: float | Mapping[str, float] | None = None,
     platform_speed: float | None = None,
+    platform_acceleration: float | None = None,
+    platform_angular_acceleration: float | None = None,
     torque: float | Mapping[str, float] | None = None,
     loads: BodyLoads | None = None,
     gravity: ArrayLike = GRAVITY,
@@ -68,6 +76,9 @@ def time_path(
         have the limits of their joints, `max_speed` and `max_acceleration`.
     platform_speed : float, optional
         Highest speed of the reference point [length/s].
+    platform_acceleration, platform_angular_acceleration : float, optional
+        Highest acceleration of the reference point [length/s^2], and highest angular acceleration of the platform
+        [rad/s^2], in any direction; by the twists of the actuators' motion.
     torque : float or mapping of str to float, optional
         The most that actuators exert, by name or the same for all [N m, of slides N]; those not named have the
         `max_torque` of their joints, which counts where the machine has the masses of all bodies. Rotors and friction
@@ -101,11 +112,12 @@ def time_path(
     if torque is None and lacking_masses(mechanism):
         torques[:] = np.inf
     most_platform = np.inf if platform_speed is None else require_positive("platform_speed", platform_speed)
+    most_twist = _twist_limits(mechanism, platform_acceleration, platform_angular_acceleration)
     every = 1.0 / require_positive("rate", rate)
-    if not np.isfinite([*speeds, *accelerations, *torques, most_platform]).any():
+    if not np.isfinite([*speeds, *accelerations, *torques, most_platform, *most_twist]).any():
         found = f"'{mechanism.name}' without max_speed and max_acceleration"
         raise InvalidArgument(
-            "speed", found, "a limit of speed, acceleration, torque or platform speed, given or in the mechanism"
+            "speed", found, "a limit of speed, acceleration, torque or the platform, given or in the mechanism"
         )
     if not len(track):
         raise InvalidArgument("track", "an empty path", "two steps or more that differ")
@@ -120,7 +132,8 @@ def time_path(
         if len(curve.s) < 2:
             continue
         refuse_swings(track, curve)
-        limits = Limits(speeds, accelerations, most_platform, torques, _torques(track, curve, torques, loads, gravity))
+        by_torque = _torques(track, curve, torques, loads, gravity)
+        limits = Limits(speeds, accelerations, most_platform, torques, by_torque, _twists(track, curve, most_twist))
         timing, limits = _fastest(curve, limits)
         parts.append((pause, _sampled(track, curve, timing, limits, every)))
         pause = 0.0
@@ -139,15 +152,36 @@ def _torques(
     weights, pull = weights_of(mechanism, loads), checked_gravity(gravity)
 
     def rows_at(s: Floats) -> MovingRows:
-        values, slopes = (curve.at(s, order)[:, :n] for order in (0, 1))
-        if np.array_equal(s, curve.s):
-            solution: Solution = track[curve.steps]
-        else:
-            solution = solve_fk(mechanism, values, start=track[curve.step_of(s)])
-        return MovingRows(solution, "actuators", slopes, weights=weights, gravity=pull)
+        slopes = curve.at(s, 1)[:, :n]
+        return MovingRows(_solution_at(track, curve, s), "actuators", slopes, weights=weights, gravity=pull)
 
     source = TorqueSource(mechanism, rows_at, curve.step_of)
     return TorquePath(limits, source, curve.grid(TORQUE_PLACES, 1))
+
+
+def _solution_at(track: Track, curve: Curve, s: Floats) -> Solution:
+    """The configurations at places s (n,) of a path."""
+    if np.array_equal(s, curve.s):
+        return track[curve.steps]
+    return solve_fk(track.mechanism, curve.at(s)[:, : curve.n_actuators], start=track[curve.step_of(s)])
+
+
+def _twist_limits(mechanism: Mechanism, acceleration: float | None, angular: float | None) -> Floats:
+    """Limits of a platform's accelerations, (2,); infinite where there is none."""
+    if angular is not None and mechanism.end_effector_is_joint:
+        found = f"a limit for '{mechanism.end_effector}', a joint"
+        raise InvalidArgument(
+            "platform_angular_acceleration", found, "a body as end effector: a joint's centre turns not"
+        )
+    named = {"platform_acceleration": acceleration, "platform_angular_acceleration": angular}
+    return np.array([np.inf if value is None else require_positive(name, value) for name, value in named.items()])
+
+
+def _twists(track: Track, curve: Curve, limits: Floats) -> PlatformPath | None:
+    """The accelerations of the platform along a path; None where none is limited."""
+    if not np.isfinite(limits).any():
+        return None
+    return PlatformPath(limits, partial(_solution_at, track, curve), curve.grid(TORQUE_PLACES, 1))
 
 
 def refuse_swings(track: Track, curve: Curve) -> None:
@@ -167,12 +201,12 @@ def refuse_swings(track: Track, curve: Curve) -> None:
 
 
 def _fastest(curve: Curve, limits: Limits) -> tuple[Timing, Limits]:
-    """The fastest timing on a grid that is as fine as torques need it, and its limits, exact where it is."""
+    """The fastest timing on a grid that is as fine as its limits need it, and these, exact where it is."""
     s, before = curve.grid(), None
     timing = _fastest_on(s, curve, limits)
-    if limits.path is None:
+    if limits.path is None and limits.twists is None:
         return timing, limits
-    limits = with_exact_torques(curve, timing, limits)
+    limits = with_exact_splines(curve, timing, limits)
     for _ in range(REFINEMENTS):
         over = cells_over(curve, timing, limits, before)
         if not over.any():
@@ -192,37 +226,41 @@ def _fastest_on(s: Floats, curve: Curve, limits: Limits) -> Timing:
         caps = 1.0 / shares**2
     caps = np.minimum(np.append(caps, caps[-1:]), np.append(caps[:1], caps))
     caps[~np.isfinite(caps)] = np.finfo(float).max ** 0.5
-    by_push, by_speed, most = slopes, bends, np.tile(limits.accelerations, (len(s), 1))
+    by_push, by_speed = (np.ascontiguousarray(each[:, :n]) for each in (slopes, bends))
+    most = np.tile(limits.accelerations, (len(s), 1))
     rest = viscous = np.zeros(most.shape)
     if limits.path is not None:
         parts = limits.path.at_either_sign(s, slopes[:, :n], bends[:, :n])
         limited = np.isfinite(limits.accelerations).nonzero()[0]
-        by_push, by_speed = _beside(slopes[:, limited], parts.by_push), _beside(bends[:, limited], parts.by_speed)
-        rest, viscous = _beside(rest[:, limited], parts.rest), _beside(viscous[:, limited], parts.viscous)
-        most = _beside(most[:, limited], parts.most)
+        by_push, by_speed = beside(slopes[:, limited], parts.by_push), beside(bends[:, limited], parts.by_speed)
+        rest, viscous = beside(rest[:, limited], parts.rest), beside(viscous[:, limited], parts.viscous)
+        most = beside(most[:, limited], parts.most)
         _refuse_heavy(curve, s, parts, limits.path)
-    x, at_rest, held = np.empty(len(s)), bool(np.isfinite(most).any()), rest
+    platform = None
+    if limits.twists is not None:
+        platform = PlatformRows(limits.twists.at(s, slopes[:, :n], bends[:, :n]), limits.twists.limits)
+    x, at_rest, held = np.empty(len(s)), bool(np.isfinite(most).any()) or platform is not None, rest
+    off = np.zeros(1)
     for _ in range(ROUNDS):
-        fastest(s, by_push, by_speed, most, held, caps, at_rest, x)
+        rows = by_push, by_speed, most, held
+        fastest(s, *(rows if platform is None else platform.beside(*rows)), caps, at_rest, x)
         acceleration_shares(s, x, slopes, bends, limits.accelerations, shares)
         before, held = held, rest + viscous * np.sqrt(x)[:, None]
         drag = np.abs(held - before) > TOLERANCES.speed * most
-        if shares.max() <= 1.0 + TOLERANCES.speed and not drag.any():
+        off = off if platform is None else platform.shares(s, x)
+        if shares.max() <= 1.0 + TOLERANCES.speed and not drag.any() and off.max() <= 1.0 + ROUND:
             break
+        if platform is not None:
+            platform.add_directions(s, x)
         slower = np.where(shares > 1.0, shares, 0.0) ** 2
         slower = np.maximum(np.append(slower, 0.0), np.append(0.0, slower))
         caps = np.where(slower > 0.0, np.minimum(caps, x / np.maximum(slower, 1.0)), caps)
-    timing = Timing(s, x / max(1.0, shares.max()))
+    timing = Timing(s, x / max(1.0, shares.max(), off.max()))
     stuck = timing.speeds[1:] + timing.speeds[:-1] <= 0.0
     if stuck.any():
-        rows = curve.step_of(s[:-1][stuck])[:5].tolist()
-        raise InvalidArgument("track", "steps that no limit lets it pass", "a smoother path", rows=rows)
+        steps = curve.step_of(s[:-1][stuck])[:5].tolist()
+        raise InvalidArgument("track", "steps that no limit lets it pass", "a smoother path", rows=steps)
     return timing
-
-
-def _beside(one: Floats, other: Floats) -> Floats:
-    """Columns of two arrays, (n, m) and (n, k), as kernels take them."""
-    return np.ascontiguousarray(np.hstack([one, other]))
 
 
 def _refuse_heavy(curve: Curve, s: Floats, parts: TorqueParts, path: TorquePath) -> None:

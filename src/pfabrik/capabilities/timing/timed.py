@@ -25,7 +25,7 @@ from ...machine.description.mechanism import Mechanism
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-What: TypeAlias = Literal["speed", "acceleration", "torque"]
+What: TypeAlias = Literal["speed", "acceleration", "torque", "angular acceleration"]
 
 EXCEEDED = 1e-3
 """Share of a limit by which it is exceeded: what a grid between whose points speeds are kept costs of the time."""
@@ -41,7 +41,7 @@ class Exceeded(NamedTuple):
     ----------
     actuator : str
         The actuator, several of redundant ones, or "platform".
-    what : {"speed", "acceleration", "torque"}
+    what : {"speed", "acceleration", "torque", "angular acceleration"}
         What is limited.
     share : float
         The largest share of the limit.
@@ -84,8 +84,9 @@ class Timed(Printed):
     binding : array of int (n,)
         Index of that limit in `limits`.
     limits : tuple of tuple of str
-        Pairs (actuator, "speed", "acceleration" or "torque") of all actuators, and ("platform", "speed"). Redundant
-        actuators are at their limits of torque several at once: "A1 and A3".
+        Pairs (actuator, "speed", "acceleration" or "torque") of all actuators, and ("platform", "speed"); where the
+        platform's are limited, also with "acceleration" and "angular acceleration". Redundant actuators are at their
+        limits of torque several at once: "A1 and A3".
     exceeded : tuple of Exceeded
         Those that are exceeded by more than a thousandth, by how much, when and where, the most first; empty where all
         are kept. It is looked for between the samples too.

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
 import numpy as np
 
 from ...common.arrays import Floats, Record, Records
+from ...kernels.handle import Handle, Scratch
+from ...kernels.legs.records import Table
 from ...kernels.pose.search_records import Starts
 from ...kernels.rows import Rows
 from ...machine.model import Model
@@ -19,6 +21,9 @@ from .close import Closing
 from .configurations import Configurations
 from .projection import ProjectionMode
 
+if TYPE_CHECKING:
+    from ...kernels.pose.evaluate import EvaluationScratch
+
 OnProgress = Callable[[int, int], None]
 """Called with the number of targets solved, and of all."""
 
@@ -27,6 +32,22 @@ Counted = Literal["orientation", "position"]
 
 Prepared = tuple[Callable[[], int], object]
 """A call prepared for one row, which returns 0 if it solves that row, and what must be kept alive for it."""
+
+
+class LegsRead(NamedTuple):
+    """Legs that give joint coordinates by closed forms, for kernels.
+
+    Attributes
+    ----------
+    table, scratch : addresses of the kernel table and of its memory, and what must be kept alive for them.
+    sides : of each leg, (legs,).
+    columns : of the coordinates that they give.
+    """
+
+    table: Handle[Table]
+    scratch: Scratch[EvaluationScratch]
+    sides: Floats
+    columns: frozenset[int]
 
 
 class InverseEngine(ABC):
@@ -92,6 +113,13 @@ class Grower(Protocol):
 
 class Engine(InverseEngine):
     """Solves a mechanism: inverse and forward kinematics, and what results say about configurations."""
+
+    def read_legs(self, start: Configurations | None) -> LegsRead | None:
+        """The legs as kernels read joint coordinates from poses, on the sides of one start, or of home.
+
+        None where sides are not those of the start at each pose that `prepared` reaches.
+        """
+        return None
 
     @abstractmethod
     def advance(self, targets: Floats, start: Configurations) -> Configurations:

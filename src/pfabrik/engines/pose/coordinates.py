@@ -52,7 +52,7 @@ def joint_coordinates(
         return coordinates
     read_coordinates(table, poses, sides, coordinates, q_proximal)
     closure.put_actuators(coordinates, actuators)
-    coordinates = _closed(closure, _known_columns(table), poses, actuators, coordinates)
+    coordinates = _closed(closure, known_columns(table), poses, actuators, coordinates)
     if start is not None:
         angles = np.setdiff1d(table.known["column"][table.known["turns"] == 1], closure.actuated)
         coordinates[:, angles] = nearest_turn(coordinates[:, angles], start[:, angles])
@@ -61,7 +61,7 @@ def joint_coordinates(
 
 
 @derived
-def _known_columns(table: LegTable) -> frozenset[int]:
+def known_columns(table: LegTable) -> frozenset[int]:
     """Columns of the coordinates that closed forms give."""
     return frozenset(table.known["column"].tolist())
 

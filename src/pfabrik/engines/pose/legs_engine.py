@@ -34,13 +34,13 @@ from ..joints.attempts import Attempt
 from ..joints.close import Closing, in_lengths
 from ..joints.closure_engine import ClosureEngine
 from ..joints.configurations import Configurations, new_rows, steps_of
-from ..joints.engine_contract import Counted, Engine, Grower, Prepared
+from ..joints.engine_contract import Counted, Engine, Grower, LegsRead, Prepared
 from ..joints.link_distances import too_near
 from ..joints.parasitic import has_other_assemblies
 from ..joints.projection import ProjectionMode, modes_of
 from .answers import LegAnswers, leg_answers, sides_at
 from .branch import answer_unreached, branch_of, home_answer, kept, poses_decide, same_branch, starts_beside
-from .coordinates import joint_coordinates
+from .coordinates import joint_coordinates, known_columns
 from .forward import forward_kinematics
 from .leg_attempts import attempts
 from .links_of_legs import keeps_links, links_of_legs
@@ -48,6 +48,7 @@ from .nearest import limit_multipliers, nearest_positions
 from .nearest_pose import starts_at
 from .reach import count_turns, reach, rest_redundant, turns_repeatedly
 from .single import Answers, LegsAssembly, SingleTarget, assembly_of, mark_near, new_scratch, request_from
+from .table import reading_scratch, reading_table
 
 STEPS_FROM_NEAR = 60
 """Steps of a search from a configuration next to a target, which is reached in a few or not at all."""
@@ -241,6 +242,14 @@ class LegsEngine(Engine):
         if not self._keeps_apart:
             return call, single
         return lambda: call() or mark_near(self.model, rows, sides), single
+
+    def read_legs(self, start: Configurations | None) -> LegsRead | None:
+        """As `Engine.read_legs`; None with redundant joints, whose coordinates follow from poses as sides do."""
+        table = self._table
+        if table.has_implicit_joints or len(table.redundant):
+            return None
+        sides = np.require(self._sides_of(start)[0], float).copy()
+        return LegsRead(reading_table(table), reading_scratch(table), sides, known_columns(table))
 
     def follow(
         self,

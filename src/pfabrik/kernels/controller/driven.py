@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from ...common.arrays import Floats, Ints
 from .._jit import routine
+from ..dynamics.effort_at_pose import put_asked, put_components
 from ..dynamics.inverse_dynamics import put_efforts
 from ..dynamics.moving import FREE_PART, NOT_MADE, SINGULAR, Exerted, MovingMachine, MovingScratch
 from ..dynamics.placing import put_screws
@@ -46,13 +47,9 @@ def put_exerted(
     put_screws(moving, own.scratch)
     for i in range(3):
         moving.gravity[i] = gravity[i] / own.units[1]
-    for k in range(own.axes.shape[0]):
-        copy_row(own.axes[k], own.shown[k])
-        if own.tilts[0] == 1:
-            for i in range(3):
-                own.shown[k, 3 + i] = dot(vec(own.axes[k, 3:]), (pose[i, 0], pose[i, 1], pose[i, 2]))
-        own.rates[k] = dot(vec(own.shown[k]), vec(twist)) / own.units[0] + dot(vec(own.shown[k, 3:]), vec(twist[3:]))
-        own.gains[k] = dot(vec(own.shown[k]), vec(gain)) / own.units[0] + dot(vec(own.shown[k, 3:]), vec(gain[3:]))
+    put_asked(own.axes, own.tilts[0], pose, own.shown)
+    put_components(own.shown, twist, own.units[0], own.rates)
+    put_components(own.shown, gain, own.units[0], own.gains)
     marks = put_efforts(moving, own.scratch, own.shown, own.rates, own.gains, own.rates[:0], 0, own.results)
     if marks != 0:
         if marks & SINGULAR != 0:

@@ -182,18 +182,17 @@ def new_exerted(moving: MovingMachine, n: int, k: int, requests: Sequence[str] =
     n_a, loads = len(moving.actuated), len(moving.frames) + len(moving.loaded)
     shapes = {
         **dict.fromkeys(("actuators", "rates", "gains", "signs", "resting"), (n_a,)),
-        "marks": (),
         "wrenches": (loads, 6),
         "matrices": (k, k),
         "probes": (n_a, len(moving.probed)),
         "twists": (6,),
         "motions": (n_a, int(moving.counts[SHOWN])),
     }
-    always = ("actuators", "rates", "gains", "signs", "marks", *requests)
-    return Exerted(**{
-        name: np.full((n if name in always else 0, *shape), 0 if name == "marks" else fill)
-        for name, shape in shapes.items()
-    })  # fmt: skip
+    always = ("actuators", "rates", "gains", "signs", *requests)
+    found = {name: np.empty((n if name in always else 0, *shape)) for name, shape in shapes.items()}
+    for name in always:
+        found[name].fill(fill)
+    return Exerted(marks=np.zeros(n, np.int64), **found)
 
 
 def _sample(codes: str) -> list[Any]:

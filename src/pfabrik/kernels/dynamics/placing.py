@@ -21,16 +21,25 @@ def place(moving: MovingMachine, own: MovingScratch, q: Floats) -> bool:
             return False
     for i in range(3):
         for j in range(4):
-            own.T[BASE, i, j] = own.T[END, i, j] = 1.0 if i == j else 0.0
+            own.T[END, i, j] = 1.0 if i == j else 0.0
     for k in range(moving.way.shape[0]):
         step(moving.way[k], moving.way_axes[k], moving.way_points[k], q, own.T[END])
+    place_beyond(moving, own, q)
+    return True
+
+
+@routine
+def place_beyond(moving: MovingMachine, own: MovingScratch, q: Floats) -> None:
+    """Pose all frames but that of the end effector, which is there, at the coordinates of their unit motions, in L."""
+    for i in range(3):
+        for j in range(4):
+            own.T[BASE, i, j] = 1.0 if i == j else 0.0
     for k in range(moving.units.shape[0]):
         before, after = own.T[moving.units[k, PARENT]], own.T[FIRST + k]
         for i in range(3):
             for j in range(4):
                 after[i, j] = before[i, j]
         step(moving.units[k], moving.axes[k], moving.points[k], q, after)
-    return True
 
 
 @inlined
