@@ -90,7 +90,7 @@ def effort(
     if plot is not None:
         write_picture(plot, found.plot)
     print_result(as_json, found, to_stderr=output == STANDARD)
-    return int(any(found.reason))
+    return int(any(found.reason) or bool(found.projected.any()))
 
 
 def at_its_times(mechanism: pf.Mechanism, path: paths.Path, sample_time: float | None) -> pf.Track:
