@@ -578,23 +578,25 @@ def test_a_sizing_is_what_numpy_makes_of_the_rows(name: str) -> None:
     assert not any(found.reason)
     for place, drive in enumerate(machine.drives):
         force, rate, power = (x[:, place] for x in (found.actuators, found.rates, found.power))
-        row, fastest = np.argmax(np.abs(force)), rate[np.argmax(np.abs(rate))]
+        peak, fastest = force[np.argmax(np.abs(force))], np.abs(rate).max()
         seconds = np.ptp(times)
         expected = {
             "rms": math.sqrt(np.trapezoid(force**2, times) / seconds),
-            "peak": force[row],
-            "rate_at_peak": rate[row],
+            "peak": peak,
             "peak_rate": fastest,
-            "peak_power": power[np.argmax(np.abs(power))],
+            "peak_power": max(0.0, power.max()),
+            "braking": max(0.0, -power.min()),
             "mean_power": np.trapezoid(force * rate * si[place], times) / seconds,
-            "torque_margin": 1.0 - abs(force[row]) / drive.said("max_torque"),
-            "speed_margin": 1.0 - abs(fastest) / drive.said("max_speed"),
+            "torque_margin": 1.0 - abs(peak) / drive.said("max_torque"),
+            "speed_margin": 1.0 - fastest / drive.said("max_speed"),
             "motor_rms": math.sqrt(np.trapezoid((force / drive.said("gear")) ** 2, times) / seconds),
-            "motor_peak": force[row] / drive.said("gear"),
-            "motor_speed": abs(fastest) * si[place] * drive.said("gear"),
+            "motor_peak": peak / drive.said("gear"),
+            "motor_speed": fastest * si[place] * drive.said("gear"),
         }
         for field, value in expected.items():
             assert getattr(sizing, field)[place] == pytest.approx(value, rel=1e-12), (drive.name, field)
+        alike = np.abs(rate[np.abs(force) >= 0.999 * abs(peak)])
+        assert abs(sizing.rate_at_peak[place]) == pytest.approx(alike.max(), rel=2e-3, abs=2e-5 * fastest)
     assert sizing.mean_power.sum() * seconds == pytest.approx(found.energy[-1])
     bare = pf.inverse_dynamics(sway(weighed(pf.load(name)), 0.02, times)).sizing
     assert all(np.isnan(each).all() for each in (bare.torque_margin, bare.motor_rms, bare.motor_speed))
@@ -627,3 +629,40 @@ def test_out_of_reach_forces_are_those_of_what_the_machine_does(name: str) -> No
     assert "out of reach" in str(found) and f"{int(found.projected.sum())} targets" in str(found)
     with pytest.raises(pf.errors.InvalidArgument, match="not reached"):
         pf.identify(path, np.ones(path.actuators.shape))
+
+
+@pytest.mark.parametrize("name", ["delta", "stewart"])
+def test_a_picture_of_efforts_has_every_actuator_between_its_limits(name: str) -> None:
+    pytest.importorskip("matplotlib")
+    from matplotlib import pyplot
+    from matplotlib.colors import to_hex
+
+    machine = motorised(weighed(pf.load(name)))
+    found = pf.inverse_dynamics(sway(machine, 2.0, np.linspace(0.0, 2.4, 161)))
+    figure = found.plot(theme="dark")
+    *panels, power, _ = figure.axes
+    assert len(panels) == 2 * len(machine.drives)
+    for place, (drive, over_time, over_rates) in enumerate(zip(machine.drives, panels[::2], panels[1::2], strict=True)):
+        force, most, fastest = found.actuators[:, place], drive.said("max_torque"), drive.said("max_speed")
+        rate = np.degrees(found.rates[:, place]) if drive.kind == "angle" else found.rates[:, place]
+        fastest = math.degrees(fastest) if drive.kind == "angle" else fastest
+        np.testing.assert_array_equal(over_time.lines[0].get_ydata(), force)
+        held = np.asarray(over_time.lines[1].get_ydata())
+        np.testing.assert_array_equal(held, np.where(np.abs(force) >= most * (1 - 1e-4), force, np.nan))
+        level = [float(line.get_ydata()[0]) for line in over_time.lines if len(set(line.get_ydata())) == 1]
+        assert {-most, most, found.sizing.rms[place], found.sizing.peak[place]} <= set(level)
+        assert {-fastest, fastest} <= {float(line.get_xdata()[0]) for line in over_rates.lines}
+        inside, beyond = (np.asarray(each.get_offsets()) for each in over_rates.collections)
+        rows = ~np.isnan(force)
+        cloud = np.stack([rate, force], axis=1)[rows]
+        is_beyond = (np.abs(cloud) >= np.array([fastest, most]) * (1 - 1e-4)).any(axis=1)
+        np.testing.assert_allclose(beyond[~np.isnan(beyond).any(axis=1)], cloud[is_beyond])
+        np.testing.assert_allclose(inside[~np.isnan(inside).any(axis=1)], cloud[~is_beyond])
+        assert drive.name in over_time.get_title(loc="left")
+        assert f"rms {found.sizing.rms[place]:.4g}" in over_time.get_title(loc="left")
+    total = np.asarray(power.lines[-1].get_ydata())
+    np.testing.assert_array_equal(total, found.power.sum(axis=1))
+    assert to_hex(figure.get_facecolor()) == "#14161a"
+    pyplot.close(figure)
+    with pytest.raises(pf.errors.InvalidArgument, match="size"):
+        found.plot(size=(1.0, 1.0))

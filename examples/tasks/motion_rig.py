@@ -47,17 +47,11 @@ print(motion)
 #
 # `inverse_dynamics` takes rates and accelerations from the times of the track. Positive pushes.
 found = pf.inverse_dynamics(motion)
-print("cylinder   peak push   peak pull   rms force   top speed   peak power")
-for name, exerted, speed, power in zip(
-    rig.actuator_names, found.actuators.T, found.rates.T, found.power.T, strict=True
-):
-    rms, pull = np.sqrt(np.mean(exerted**2)), max(0, -exerted.min())
-    numbers = f"{exerted.max():9.0f} N {pull:9.0f} N {rms:9.0f} N {abs(speed).max():6.0f} mm/s {power.max():10.0f} W"
-    print(f"{name:8} {numbers}")
+print(found)
 
-# The motor's rms torque decides how warm it gets, its peak how large it must be. Of a screw without losses:
-torque = found.actuators / gear
-print(f"motors: peak {abs(torque).max():.1f} N m, rms up to {np.sqrt(np.mean(torque**2, axis=0)).max():.1f} N m")
+# Peaks are positive: no cylinder pulls more than it pushes. The motor's rms torque decides how warm it gets, its peak
+# how large it must be: those of the second table, of a screw without losses. For all six alike:
+print(f"motors: peak {abs(found.sizing.motor_peak).max():.1f} N m, rms up to {found.sizing.motor_rms.max():.1f} N m")
 
 figure, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
 axes.plot(times, found.actuators / 1000, linewidth=1.0, label=rig.actuator_names)

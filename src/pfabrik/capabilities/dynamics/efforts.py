@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ...answers.status import Status
 from ...answers.tracked import MOST_NAMED
 from ...common.arrays import Floats, Mask, as_plain, shaped
 from ...common.cells import CsvWriter
-from ...common.drawing import curves_over_time
+from ...common.drawing import Size, Theme, drawn
 from ...common.frozen import FrozenMapping
 from ...common.printed import Printed, ResultTable, plain
 from ...common.whole_files import whole_path
@@ -211,17 +211,22 @@ class Efforts(Printed):
             raise InvalidArgument("efforts", "no path with times", "those of a `track` with times, or of `time_path`")
         return self.times
 
-    def plot(self) -> Figure:
-        """Forces, speeds and power of the actuators over time, one curve each; a Matplotlib figure.
+    def plot(self, *, size: Size | None = None, theme: Theme = "light") -> Figure:
+        """Forces of every actuator over time and over its rate, between its limits, and the power of all.
+
+        Rms and peak are drawn and named; what is at a limit is orange, and times with targets out of reach are grey.
+
+        Parameters
+        ----------
+        size : (float, float), optional
+            Width and height of the figure [inches].
+        theme : {"light", "dark"}, optional
+            As in `plot`.
 
         Raises
         ------
         InvalidArgument
-            Configurations that are no path with times.
+            Configurations that are no path with times; no such size or theme.
         """
-        times, shown = self._require_times(), readouts(self._mechanism)
-        rates = np.stack([each.display(self.rates[:, place]) for place, each in enumerate(shown)], axis=1)
-        forces, units = sorted(set(self._drives.forces)), sorted({f"{each.unit}/s" for each in shown})
-        labels = f"exerts [{', '.join(forces)}]", f"rate [{', '.join(units)}]", "power [W]"
-        panels = dict(zip(labels, (self.actuators, rates, self.power), strict=True))
-        return curves_over_time(times, [each.name for each in shown], panels)
+        self._require_times()
+        return cast("Figure", drawn(self, size, theme))

@@ -16,8 +16,9 @@ PER_MINUTE = 30.0 / np.pi
 """Turns per minute of a radian per second."""
 
 
-STANDS = 1e-5
-"""Share of the highest rate up to which a rate is printed as 0: differences of places leave as much."""
+STANDS, ALIKE = 1e-5, 1e-3
+"""Share of the highest rate or power up to which one is printed as 0, for differences of places leave as much; and
+share by which forces, or rates, differ that count as one: a motor at its limit is there for a while."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +33,12 @@ class Sizing(Printed):
     rms : array (n_a,)
         Root mean square of the force or torque, which warms a motor [N, N m].
     peak, rate_at_peak : array (n_a,)
-        The force or torque of the largest magnitude [N, N m], and the rate at which it is exerted [length or rad per
-        s].
+        The force or torque of the largest magnitude [N, N m], and the rate there [length or rad per s]: where the force
+        is that, to a thousandth, the highest rate, and the sign that goes with it.
     peak_rate : array (n_a,)
-        The rate of the largest magnitude [length or rad per s].
-    peak_power, mean_power : array (n_a,)
-        The power of the largest magnitude, and its mean; negative where the actuator brakes [W].
+        The highest rate, of either sign [length or rad per s].
+    peak_power, braking, mean_power : array (n_a,)
+        The most power that the actuator gives, the most that it takes, and the mean of what it gives [W].
     torque_margin, speed_margin : array (n_a,)
         What is left of `max_torque` and `max_speed`: 1 of an idle motor, 0 at the limit, negative beyond; NaN where the
         machine has none.
@@ -51,6 +52,7 @@ class Sizing(Printed):
     rate_at_peak: Floats
     peak_rate: Floats
     peak_power: Floats
+    braking: Floats
     mean_power: Floats
     torque_margin: Floats
     speed_margin: Floats
@@ -67,16 +69,19 @@ class Sizing(Printed):
         least, rows, motors = 1e-9 * np.abs(self.peak).max(initial=0.0), [], []
         for place, each in enumerate(shown):
             there, fastest = (float(each.display(x[place])) for x in (self.rate_at_peak, self.peak_rate))
-            rates = (plain(x, STANDS * abs(fastest), ".5g") for x in (there, fastest))
-            powers = (plain(float(x[place]), 0.0, ".5g") for x in (self.peak_power, self.mean_power))
+            rates = (plain(x, STANDS * fastest, ".5g") for x in (there, fastest))
+            power = max(self.peak_power[place], self.braking[place])
+            powers = (self.peak_power, self.braking, self.mean_power)
+            watts = (plain(float(x[place]), STANDS * power, ".5g") for x in powers)
             forces = (plain(float(x[place]), least, ".5g") for x in (self.rms, self.peak))
             left = (plain(float(x[place]), 0.0, ".0%") for x in margins.values())
-            rows.append([each.name, *forces, units[place], *rates, f"{each.unit}/s", *powers, *left])
+            rows.append([each.name, *forces, units[place], *rates, f"{each.unit}/s", *watts, *left])
             if np.isfinite(self.motor_rms[place]):
                 speed = PER_MINUTE * self.motor_speed[place]
                 numbers = (self.motor_rms[place], self.motor_peak[place], speed)
                 motors.append([each.name, *(plain(float(x), 0.0, ".5g") for x in numbers)])
-        header = ["actuator", "rms", "peak", "unit", "at a rate of", "peak rate", "unit", "peak power [W]", "mean [W]"]
+        header = ["actuator", "rms", "peak", "unit", "at rate", "peak rate", "unit"]
+        header += ["gives [W]", "brakes [W]", "mean [W]"]
         header += [f"left {name}" for name in margins]
         before = ResultTable("Motors", (), ("motor", "rms [N m]", "peak [N m]", "peak rate [rpm]"), motors)
         return ResultTable(self._mechanism.name, (), header, rows, more=[before] if motors else [])
@@ -89,22 +94,26 @@ def sizing_of(mechanism: Mechanism, exerted: Floats, rates: Floats, power: Float
         exerted = rates = power = np.full((1, exerted.shape[1]), np.nan)
         known, weights = np.ones(1, bool), np.ones(1)
     exerted, rates, power, shares = exerted[known], rates[known], power[known], weights[known] / weights[known].sum()
-    drives, columns, row = drives_of(mechanism), np.arange(exerted.shape[1]), np.abs(exerted).argmax(axis=0)
-    rms, peak = np.sqrt(shares @ exerted**2), exerted[row, columns]
-    fastest, strongest = (x[np.abs(x).argmax(axis=0), columns] for x in (rates, power))
+    drives, size, speed = drives_of(mechanism), np.abs(exerted), np.abs(rates)
+    rms, most, fastest = np.sqrt(shares @ exerted**2), size.max(axis=0), speed.max(axis=0)
+    near = np.where(size >= (1.0 - ALIKE) * most, speed, -np.inf)
+    row = np.argmax(near >= (1.0 - ALIKE) * near.max(axis=0) - STANDS * fastest, axis=0)  # the first of those alike
+    there = row, np.arange(len(row))
+    peak = np.copysign(most, exerted[there])
     gears = np.array([drive.said("gear") or np.nan for drive in mechanism.drives])
     return Sizing(
         rms,
         peak,
-        rates[row, columns],
+        rates[there],
         fastest,
-        strongest,
+        np.maximum(power.max(axis=0), 0.0),
+        np.maximum(-power.min(axis=0), 0.0),
         shares @ power,
         _left(peak, drives.limits),
         _left(fastest, drive_limits(mechanism, "speed", None)),
         rms / np.abs(gears),
         peak / gears,
-        np.abs(fastest * drives.si * gears),
+        fastest * drives.si * np.abs(gears),
         mechanism,
     )
 
