@@ -190,9 +190,12 @@ class Design(Printed):
 
         Parameters
         ----------
-        view, theme : as in `plot`.
+        view : str or (float, float), optional
+            As in `plot`.
         size : (float, float), optional
             Width and height of the figure [inches].
+        theme : {"light", "dark"}, optional
+            As in `plot`.
 
         Raises
         ------
