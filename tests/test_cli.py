@@ -56,6 +56,26 @@ def test_every_machine_supplied_is_shown_whole_and_checked_as_well(name: str) ->
     assert checked.stderr == (f"pfabrik: note: {hint}\n" if hint else "")
 
 
+def test_a_load_counts_before_the_limits_of_actuators() -> None:
+    solution = pf.solve_ik(pf.load("stewart"), pf.pose([10.0, 5.0, 190.0], rpy=np.radians([5.0, 0.0, 0.0])))
+    arm = solution.pose[:3, :3] @ np.array([0.0, 10.0, 20.0])
+    weight = np.array([0.0, 0.0, -5.0 * 9.81])
+    wrench = np.concatenate([weight + [3.0, 0.0, -20.0], np.cross(arm, weight)])
+    centre = np.add(solution.mechanism.reference_point, [0.0, 10.0, 20.0])
+    line = (
+        f"forces stewart --position 10 5 190 --rpy 5 0 0 --force 3 0 -20 --load platform=5,{','.join(map(str, centre))}"
+    )
+    found = json.loads(pfabrik(f"{line} --limit 90 --limit BL1=-5:60 --json").stdout)
+    limits = dict.fromkeys(solution.mechanism.actuator_names, 90.0) | {"BL1": (-5.0, 60.0)}
+    assert found["capacity"]["radius"] == pytest.approx(pf.wrench_capacity(solution, limits, wrench=wrench).radius)
+    assert found["actuators"] == pytest.approx(pf.forces(solution, wrench).actuators.tolist())
+    most = float(np.max(found["actuators"]))
+    beyond = pfabrik(f"{line} --limit {most - 1.0}")
+    place = solution.mechanism.actuator_names[int(np.argmax(found["actuators"]))]
+    assert beyond.exit_code == 1 and f"{place} would exert {most:.5g}, 1 above its limit" in beyond.stdout
+    assert pfabrik(f"{line} --limit {most + 1.0}").exit_code == 0
+
+
 def refuse(constant: str) -> None:
     raise AssertionError(f"{constant} is no JSON")
 
@@ -119,8 +139,10 @@ def singular() -> dict[str, Any]:
 def loaded() -> dict[str, Any]:
     answer, wrench = pf.solve_ik(STEWART, [0, 5, 190]), [0, 0, -200, 0, 500, 0]
     limits = dict.fromkeys(STEWART.actuator_names, 90.0) | {"BL1": (-5.0, 90.0)}
-    capacity = pf.wrench_capacity(answer, limits, wrench=wrench)
-    return pf.forces(answer, wrench).to_dict() | {"capacity": capacity.to_dict()}
+    used = pf.forces(answer, wrench).actuators[:, None]
+    left = np.array([limits[name] if name == "BL1" else (-90.0, 90.0) for name in STEWART.actuator_names]) - used
+    capacity = pf.wrench_capacity(answer, left)
+    return pf.forces(answer, wrench, limits=limits).to_dict() | {"capacity": capacity.to_dict()}
 
 
 def carried() -> dict[str, Any]:
@@ -428,7 +450,6 @@ REFUSED = [
     ("forces five_bar --position 0 0 190 --moment 0 0 1", "the end effector is a joint"),
     ("forces stewart --load platform", "--load BODY=MASS,X,Y,Z: found 'platform'; expected 4 finite numbers"),
     ("forces stewart --load platfrm=5,0,0,190", "did you mean 'platform'?"),
-    ("forces stewart --load platform=5,0,0,190 --limit 9", "--limit goes with --force and --moment"),
     ("forces stewart --limit BL1=5", "--limit: found no value of BL2, BL3"),
     ("forces stewart --limit 5:x", "found '5:x'; expected a positive number, or MIN:MAX"),
     ("stiffness stewart", "Missing option '--k' (for example: pfabrik stiffness stewart --k 500; see"),

@@ -318,6 +318,19 @@ def test_efforts_of_a_path_go_to_a_file_row_by_row() -> None:
     check_written(Path("out.svg"))
 
 
+def test_efforts_out_of_reach_are_those_of_the_nearest_poses_and_said() -> None:
+    write_files("weighed.toml")
+    heights = [190 + 40 * step for step in range(12)]
+    Path("far.csv").write_text("y,z\n" + "\n".join(f"0,{height}" for height in heights) + "\n")
+    done = pfabrik("effort weighed.toml far.csv --sample-time 0.1 -o out.csv")
+    path = pf.track(pf.load("weighed.toml"), [[0, 0, height] for height in heights], sample_time=0.1)
+    is_off = path.status == pf.Status.PROJECTED
+    assert done.exit_code == 1 and is_off.any() and not is_off.all()
+    assert [row["projected"] for row in rows_of("out.csv")] == [str(int(off)) for off in is_off]
+    first = int(np.flatnonzero(is_off)[0]) + 1
+    assert f"{is_off.sum()} targets: {first} to 12" in done.output
+
+
 @pytest.mark.parametrize(
     "line",
     [

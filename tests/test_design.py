@@ -473,3 +473,44 @@ def test_errors_are_one_sentence(changed: dict[str, Any], says: str) -> None:
     with pytest.raises((pf.errors.InvalidArgument, pf.errors.UnknownName)) as raised:
         pf.design(**(asked | changed))
     assert says in str(raised.value) and "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("reach", "edges"),
+    [
+        (PoseRegion.box([-30, -30, -10], [30, 30, 60]), 12),
+        (PoseRegion.cylinder([0, 0, 20], 25, 60), 6),
+        (PoseRegion.ball([0, 0, 20], 25), 3),
+        (np.array([[0.0, 0.0, 0.0], [20.0, 0.0, 90.0]]), 0),
+    ],
+)
+def test_a_picture_has_the_machine_before_and_after_around_what_is_to_be_reached(reach: Any, edges: int) -> None:
+    pytest.importorskip("matplotlib")
+    from matplotlib import pyplot
+
+    machine = pf.load(TEMPLATES / "6-UPS.toml")
+    found = pf.design(machine, {"longest": (200, 600)}, reach, minimise="longest", about="home")
+    assert found and found.mechanism is not None
+    figure = found.plot(view="top")
+    poses = reach.pose(np.array([reach.low, reach.high])) if edges else pf.pose(reach)
+    scales, spots = [], []
+    for axes, each in zip(figure.axes, (machine, found.mechanism), strict=True):
+        home = each.home_pose[:2, 3]
+        dashed = [np.array(line.get_xydata()) - home for line in axes.lines if line.get_linestyle() == "--"]
+        assert len(dashed) == edges
+        if edges:  # seen from the top, x to the right, lines are within the region, and touch its ends
+            seen = np.concatenate(dashed)
+            np.testing.assert_allclose([seen.min(axis=0), seen.max(axis=0)], poses[:, :2, 3], atol=1e-9)
+        dots = {line.get_label(): np.array(line.get_xydata()) - home for line in axes.lines}
+        drawn = np.concatenate([dots.get("reached", np.zeros((0, 2))), dots.get("not reached", np.zeros((0, 2)))])
+        moved = found._reach.at(each, found._reach.poses)
+        is_reached = np.asarray(pf.solve_ik(each, moved).status) == Status.REACHED
+        assert len(drawn) == len(moved) and len(dots.get("not reached", ())) == (~is_reached).sum()
+        assert f"{is_reached.sum()} of {len(moved)} poses reached" in axes.get_title()
+        assert f"longest {each.dimensions['longest']:.5g}" in axes.get_title()
+        scales.append(np.ptp(axes.get_xlim()) / axes.bbox.width)
+        spots.append(is_reached)
+    assert spots[1].all() and scales[0] == pytest.approx(scales[1], rel=0.02)
+    pyplot.close(figure)
+    with pytest.raises(pf.errors.InvalidArgument, match="theme"):
+        found.plot(theme="none")  # type: ignore[arg-type]

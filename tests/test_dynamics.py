@@ -290,9 +290,10 @@ def test_a_slider_does_not_drive_its_crank_through_dead_centre() -> None:
         np.testing.assert_array_equal(np.isnan(found.actuators[:, 0]), is_dead)
     np.testing.assert_array_equal(np.isnan(pf.mass_matrix(solution)[:, 0, 0]), is_dead)
     path = pf.track(machine, solution.pose, start=solution[0], sample_time=0.1)
-    for refused in (lambda: pf.inverse_dynamics(path), lambda: pf.time_path(path, torque=500.0, gravity=down)):
-        with pytest.raises(pf.errors.InvalidArgument, match=r"track: .* not reached.*row: 2\)"):
-            refused()
+    stopped = pf.inverse_dynamics(path)
+    assert all(stopped.reason) and stopped.projected.tolist() == is_dead.tolist()
+    with pytest.raises(pf.errors.InvalidArgument, match=r"track: .* not reached.*row: 2\)"):
+        pf.time_path(path, torque=500.0, gravity=down)
 
 
 @pytest.mark.parametrize(("name", "motions", "still"), [("rps", 3, []), ("five_bar", 2, [0])])
@@ -557,3 +558,111 @@ def test_at_singular_poses_a_reason_is_given() -> None:
     assert "serial singularity" in str(found.reason)
     assert np.isnan(found.actuators).all()
     assert "serial singularity" in str(found.table())
+
+
+def sway(machine: pf.Mechanism, amount: float, times: Any) -> pf.Track:
+    """A path about home and back, so many L far, which is out of reach where that is far."""
+    way = np.random.default_rng(3).standard_normal(3) * np.isin(["x", "y", "z"], machine.task)
+    shift = amount * machine.characteristic_length * np.outer(np.sin(1.3 * times) ** 2, way / np.linalg.norm(way))
+    poses = np.tile(machine.home_pose, (len(times), 1, 1))
+    poses[:, :3, 3] += shift
+    return pf.track(machine, poses, times=times)
+
+
+@pytest.mark.parametrize("name", ["delta", "five_bar", "hexaglide", "servo_hexapod"])
+def test_a_sizing_is_what_numpy_makes_of_the_rows(name: str) -> None:
+    machine = motorised(weighed(pf.load(name)))
+    times = np.cumsum(np.random.default_rng(2).uniform(0.01, 0.03, 60))
+    found = pf.inverse_dynamics(sway(machine, 0.02, times))
+    sizing, si = found.sizing, units(machine)[1]
+    assert not any(found.reason)
+    for place, drive in enumerate(machine.drives):
+        force, rate, power = (x[:, place] for x in (found.actuators, found.rates, found.power))
+        peak, fastest = force[np.argmax(np.abs(force))], np.abs(rate).max()
+        seconds = np.ptp(times)
+        expected = {
+            "rms": math.sqrt(np.trapezoid(force**2, times) / seconds),
+            "peak": peak,
+            "peak_rate": fastest,
+            "peak_power": max(0.0, power.max()),
+            "braking": max(0.0, -power.min()),
+            "mean_power": np.trapezoid(force * rate * si[place], times) / seconds,
+            "torque_margin": 1.0 - abs(peak) / drive.said("max_torque"),
+            "speed_margin": 1.0 - fastest / drive.said("max_speed"),
+            "motor_rms": math.sqrt(np.trapezoid((force / drive.said("gear")) ** 2, times) / seconds),
+            "motor_peak": peak / drive.said("gear"),
+            "motor_speed": fastest * si[place] * drive.said("gear"),
+        }
+        for field, value in expected.items():
+            assert getattr(sizing, field)[place] == pytest.approx(value, rel=1e-12), (drive.name, field)
+        alike = np.abs(rate[np.abs(force) >= 0.999 * abs(peak)])
+        assert abs(sizing.rate_at_peak[place]) == pytest.approx(alike.max(), rel=2e-3, abs=2e-5 * fastest)
+    assert sizing.mean_power.sum() * seconds == pytest.approx(found.energy[-1])
+    bare = pf.inverse_dynamics(sway(weighed(pf.load(name)), 0.02, times)).sizing
+    assert all(np.isnan(each).all() for each in (bare.torque_margin, bare.motor_rms, bare.motor_speed))
+    assert "left of" not in str(bare) and "left of torque" in str(found) and "rpm" in str(found)
+
+
+@pytest.mark.parametrize("name", ["delta", "five_bar", "hexaglide", "stewart"])
+def test_out_of_reach_forces_are_those_of_what_the_machine_does(name: str) -> None:
+    machine, peaks = weighed(pf.load(name)), []
+    for count in (161, 641):
+        path = sway(machine, 2.0, np.linspace(0.0, 2.4, count))
+        found = pf.inverse_dynamics(path)
+        assert found.projected.any() and not found.projected.all()
+        np.testing.assert_array_equal(found.projected, path.status == pf.Status.PROJECTED)
+        again = pf.track(machine, path.pose, times=path.times)
+        assert again
+        done = pf.inverse_dynamics(again).actuators
+        held = [{(each.joint, each.bound) for each in limits} for limits in path.active_limits]
+        held = [each if off else set() for each, off in zip(held, found.projected, strict=True)]
+        leaps = [k for k in range(1, count) if held[k] != held[k - 1]]
+        rows = np.arange(count)
+        first = np.clip(rows - 2, 0, count - 5)  # of the five steps whose polynomial a row has
+        about = np.any([(first < k) & (k <= first + 4) for k in leaps], axis=0)
+        np.testing.assert_array_equal(["leaps" in each for each in found.reason], about)
+        kept = ~np.isnan(found.actuators).any(axis=1)
+        np.testing.assert_array_equal(kept, ~about)
+        np.testing.assert_allclose(found.actuators[kept], done[kept], atol=1e-5 * np.abs(done[kept]).max())
+        peaks.append(np.abs(found.sizing.peak).max())
+    assert peaks[1] < 3.0 * peaks[0]  # those of a leap would grow as the number of steps, fourfold
+    assert "out of reach" in str(found) and f"{int(found.projected.sum())} targets" in str(found)
+    with pytest.raises(pf.errors.InvalidArgument, match="not reached"):
+        pf.identify(path, np.ones(path.actuators.shape))
+
+
+@pytest.mark.parametrize("name", ["delta", "stewart"])
+def test_a_picture_of_efforts_has_every_actuator_between_its_limits(name: str) -> None:
+    pytest.importorskip("matplotlib")
+    from matplotlib import pyplot
+    from matplotlib.colors import to_hex
+
+    machine = motorised(weighed(pf.load(name)))
+    found = pf.inverse_dynamics(sway(machine, 2.0, np.linspace(0.0, 2.4, 161)))
+    figure = found.plot(theme="dark")
+    *panels, power, _ = figure.axes
+    assert len(panels) == 2 * len(machine.drives)
+    for place, (drive, over_time, over_rates) in enumerate(zip(machine.drives, panels[::2], panels[1::2], strict=True)):
+        force, most, fastest = found.actuators[:, place], drive.said("max_torque"), drive.said("max_speed")
+        rate = np.degrees(found.rates[:, place]) if drive.kind == "angle" else found.rates[:, place]
+        fastest = math.degrees(fastest) if drive.kind == "angle" else fastest
+        np.testing.assert_array_equal(over_time.lines[0].get_ydata(), force)
+        held = np.asarray(over_time.lines[1].get_ydata())
+        np.testing.assert_array_equal(held, np.where(np.abs(force) >= most * (1 - 1e-4), force, np.nan))
+        level = [float(line.get_ydata()[0]) for line in over_time.lines if len(set(line.get_ydata())) == 1]
+        assert {-most, most, found.sizing.rms[place], found.sizing.peak[place]} <= set(level)
+        assert {-fastest, fastest} <= {float(line.get_xdata()[0]) for line in over_rates.lines}
+        inside, beyond = (np.asarray(each.get_offsets()) for each in over_rates.collections)
+        rows = ~np.isnan(force)
+        cloud = np.stack([rate, force], axis=1)[rows]
+        is_beyond = (np.abs(cloud) >= np.array([fastest, most]) * (1 - 1e-4)).any(axis=1)
+        np.testing.assert_allclose(beyond[~np.isnan(beyond).any(axis=1)], cloud[is_beyond])
+        np.testing.assert_allclose(inside[~np.isnan(inside).any(axis=1)], cloud[~is_beyond])
+        assert drive.name in over_time.get_title(loc="left")
+        assert f"rms {found.sizing.rms[place]:.4g}" in over_time.get_title(loc="left")
+    total = np.asarray(power.lines[-1].get_ydata())
+    np.testing.assert_array_equal(total, found.power.sum(axis=1))
+    assert to_hex(figure.get_facecolor()) == "#14161a"
+    pyplot.close(figure)
+    with pytest.raises(pf.errors.InvalidArgument, match="size"):
+        found.plot(size=(1.0, 1.0))

@@ -437,6 +437,26 @@ def test_a_load_that_tips_and_cables_that_would_push_are_said() -> None:
         pf.stiffness(hung, 40.0, forces=np.where(pushed.actuators > 0.0, np.inf, pushed.actuators))
 
 
+@pytest.mark.parametrize("name", ["stewart", "delta", "five_bar"])
+def test_actuators_beyond_their_limits_are_named_with_how_far(name: str) -> None:
+    for solution in rows_of(name):
+        loads = {"platform": (5.0, solution.mechanism.reference_point)} if name != "five_bar" else None
+        wrench = WRENCH[: 3 if solution.mechanism.end_effector_is_joint else 6]
+        needed = pf.forces(solution, wrench, loads=loads).actuators
+        names, most = solution.mechanism.actuator_names, 0.5 * float(np.abs(needed).max())
+        held = pf.forces(solution, wrench, loads=loads, limits=(-most, 0.2 * most))
+        expected = {}
+        for actuator, force in zip(names, needed, strict=True):
+            if force > 0.2 * most or force < -most:
+                bound = 0.2 * most if force > 0.0 else -most
+                expected[actuator] = f"{force:.5g}, {abs(force - bound):.5g} {'above' if force > 0.0 else 'below'}"
+        named = str(held.reason).partition("hold the load: ")[2].split("; ")
+        assert named == [f"{actuator} would exert {words} its limit" for actuator, words in expected.items()]
+        assert expected and np.isnan(held.actuators).all()
+        within = pf.forces(solution, wrench, loads=loads, limits=2.5 * most)
+        np.testing.assert_allclose(within.actuators, needed, rtol=1e-7)
+
+
 def test_rods_that_stretch_are_as_soft_as_slides_in_them() -> None:
     """The same machine with a spring in each rod, as a twelfth actuator, has stiffness from actuators alone."""
     base = np.array(ring(150.0, 0.0, (6, 115, 126, 235, 246, 355)))

@@ -67,17 +67,14 @@ while high - low > 0.005:
     low, high = (low, middle) if pf.time_path(path, torque=middle, loads=part).duration < 0.2 else (middle, high)
 print(f"{high:.2f} N m")
 
-# What that motion takes of each motor. The root mean square is what warms it where it does not pause; power and speed
-# say whether a motor and its gear fit.
+# What that motion takes of each motor. The root mean square is what warms it where it does not pause; its peak and
+# highest rate say whether a motor and its gear fit. `efforts.sizing` has the numbers.
 fast = pf.time_path(path, torque=high, loads=part)
 efforts = pf.inverse_dynamics(fast, loads=part)
-peaks = np.abs([efforts.actuators, efforts.power, np.degrees(efforts.rates)]).max(axis=1)
-rms = np.sqrt(np.mean(efforts.actuators**2, axis=0))
-print("motor  torque: peak     rms   power    speed")
-for name, mean, torque, power, speed in zip(delta.actuator_names, rms, *peaks, strict=True):
-    print(f"{name}       {torque:.2f} N m  {mean:.2f} N m  {power:.1f} W  {speed:.0f} deg/s")
+print(efforts)
 
-# Arms 2 and 3 carry the part across, and take turns at their limit.
+# Arms 2 and 3 carry the part across, and take turns at their limit. On the right, each torque over the rate at which
+# it is exerted: a motor whose curve goes round that will do.
 efforts.plot().savefig("torques.png", dpi=80)
 
 # ## Where does the torque go?

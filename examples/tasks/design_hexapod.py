@@ -8,7 +8,6 @@ pose is reached, and what holds the size where it is. SciPy is needed: `pip inst
 import subprocess
 import sys
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 import pfabrik as pf
@@ -52,11 +51,8 @@ print(sorted({each.requirement for each in found.binding if each.share > 0.05}))
 # Distances from singularities have no proof; samples decide, and the result says so.
 print("by samples:", *found.unproved)
 
-# The machine as it came, and as it is now, at one scale:
-figure, axes = plt.subplots(1, 2, figsize=(8, 4), gridspec_kw={"left": 0, "right": 1, "bottom": 0, "top": 1})
-pf.plot(hexapod, ax=axes[0], like=found.mechanism)
-pf.plot(found.mechanism, ax=axes[1], like=hexapod)
-figure.savefig("struts.png", dpi=110)
+# The machine as it came, and as it is now, at one scale, with the positions that it is to reach:
+found.plot().savefig("struts.png", dpi=110)
 
 # ## Joints that are not where the drawing says
 #

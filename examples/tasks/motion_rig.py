@@ -6,8 +6,8 @@ left for the unexpected.
 """
 
 # The rig: six cylinders between pairs of joints, lengths in millimetres. Each has a screw that moves 10 mm a turn, so a
-# gear of 200 pi radians per metre, and a motor whose rotor has 3 kg cm². Forces are in N, torques in N m.
-import matplotlib.pyplot as plt
+# gear of 200 pi radians per metre, a motor whose rotor has 3 kg cm², and exerts 3 kN at most. Forces are in N, torques
+# in N m.
 import numpy as np
 
 import pfabrik as pf
@@ -17,7 +17,7 @@ legs = pf.Leg(
     "U-P*-S",
     base=[[1100, 150, 0], [1100, -150, 0]],
     platform=[[450, 700, 1100], [450, -700, 1100]],
-    by_letter={"B": {"range": (1080, 1680), "rotor_inertia": 3e-4, "gear": gear}},
+    by_letter={"B": {"range": (1080, 1680), "rotor_inertia": 3e-4, "gear": gear, "max_torque": 3000}},
     copies={"count": 3, "axis": [0, 0, 1]},
 )
 rig = pf.Mechanism.from_legs(legs, reference_point=[0, 0, 1100], name="motion rig")
@@ -47,24 +47,14 @@ print(motion)
 #
 # `inverse_dynamics` takes rates and accelerations from the times of the track. Positive pushes.
 found = pf.inverse_dynamics(motion)
-print("cylinder   peak push   peak pull   rms force   top speed   peak power")
-for name, exerted, speed, power in zip(
-    rig.actuator_names, found.actuators.T, found.rates.T, found.power.T, strict=True
-):
-    rms, pull = np.sqrt(np.mean(exerted**2)), max(0, -exerted.min())
-    numbers = f"{exerted.max():9.0f} N {pull:9.0f} N {rms:9.0f} N {abs(speed).max():6.0f} mm/s {power.max():10.0f} W"
-    print(f"{name:8} {numbers}")
+print(found)
 
-# The motor's rms torque decides how warm it gets, its peak how large it must be. Of a screw without losses:
-torque = found.actuators / gear
-print(f"motors: peak {abs(torque).max():.1f} N m, rms up to {np.sqrt(np.mean(torque**2, axis=0)).max():.1f} N m")
+# Peaks are positive: no cylinder pulls more than it pushes. The motor's rms torque decides how warm it gets, its peak
+# how large it must be: those of the second table, of a screw without losses. For all six alike:
+print(f"motors: peak {abs(found.sizing.motor_peak).max():.1f} N m, rms up to {found.sizing.motor_rms.max():.1f} N m")
 
-figure, axes = plt.subplots(figsize=(7, 3.2), layout="constrained")
-axes.plot(times, found.actuators / 1000, linewidth=1.0, label=rig.actuator_names)
-axes.axhline(0, color="0.6", linewidth=0.8)
-axes.set(xlabel="time [s]", ylabel="force [kN], positive pushes", xlim=(0, 5), ylim=(-0.1, 2.9))
-axes.legend(ncols=6, frameon=False, fontsize=8)
-figure.savefig("forces.png", dpi=110)
+# Over time on the left, over the rate on the right: a drive whose curve goes round each cloud will do.
+found.plot().savefig("forces.png", dpi=80)
 
 # ## What is it for?
 #
@@ -86,8 +76,8 @@ print(f"lower joint A1: at most {lower.max():.0f} N")
 
 # ## What is left
 #
-# With cylinders of 3 kN, the largest force that may come on top of all this from any direction, at the worst moment
-# of the five seconds after which the motion is repeated: what each cylinder still has, up and down, is its limit there.
+# The largest force that may come on top of all this from any direction, at the worst moment of the five seconds after
+# which the motion is repeated: what each cylinder still has of its 3 kN, up and down, is its limit there.
 rows = range(0, 500, 10)
 spare = np.stack([-3000 - found.actuators, 3000 - found.actuators], axis=-1)
 left = [pf.wrench_capacity(motion[row], spare[row]) for row in rows]

@@ -58,6 +58,7 @@ from .capabilities.dynamics.identification import Identification as Identificati
 from .capabilities.dynamics.identify import identify as identify
 from .capabilities.dynamics.inverse_dynamics import inverse_dynamics as inverse_dynamics
 from .capabilities.dynamics.mass_matrix import mass_matrix as mass_matrix
+from .capabilities.dynamics.sizing import Sizing as Sizing
 from .capabilities.modes.assembly import AssemblyModes as AssemblyModes
 from .capabilities.modes.assembly import assembly_modes as assembly_modes
 from .capabilities.modes.working import WorkingModes as WorkingModes

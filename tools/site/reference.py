@@ -98,7 +98,7 @@ PAGES = {
         "Inverse dynamics",
         "What actuators exert to move the masses of a machine, along a path or at a configuration. Forces are in N, "
         "moments in N m, whatever the machine's unit of length.",
-        "inverse_dynamics Efforts mass_matrix identify Identification BaseParameter",
+        "inverse_dynamics Efforts Sizing mass_matrix identify Identification BaseParameter",
     ),
     "calibration": Page(
         "Calibration",

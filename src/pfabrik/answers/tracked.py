@@ -205,9 +205,9 @@ class Track(Solution):
         return [tuple(name for name, over in zip(names, row, strict=True) if over) for row in beyond]
 
 
-def refuse_leaps(track: Track) -> None:
-    """Refuse a track with steps that are not reached, or that jump."""
-    _refuse(track.status != Status.REACHED, "not reached")
+def refuse_leaps(track: Track, worst: Status = Status.REACHED) -> None:
+    """Refuse a track with steps that are not reached, or of a status worse than another one, or that jump."""
+    _refuse(track.status > worst, "not reached")
     _refuse(track.jumps, "leaping from the one before")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,11 @@ from .certify import RegionOptions, regioned
 from .options import named_values
 from .outputs import (
     OUTPUT,
+    PictureOptions,
     check_outputs,
     force_option,
+    note_no_picture,
+    pictured,
     refuse_both_on_stdout,
     refuse_existing,
     require_picture,
@@ -46,7 +50,8 @@ WHAT = "size, stroke, or an expression of dimensions; twice for a front. Default
 @click.option("--minimise", multiple=True, default=["size"], metavar="WHAT", help=WHAT)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of starts and samples.")
 @click.option("-o", "--output", help="Mechanism file to write, with the dimensions found.", **OUTPUT)
-@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Picture of the rounds: PNG, SVG or PDF.")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Before and after: PNG, SVG or PDF.")
+@pictured()
 @force_option
 @json_option()
 def design(
@@ -59,6 +64,7 @@ def design(
     seed: int,
     output: Path | None,
     plot: Path | None,
+    drawn: PictureOptions,
     force: bool,
     as_json: bool,
     **kept: Any,
@@ -72,6 +78,8 @@ def design(
     check_outputs([("-o", output), ("--plot", plot)], map(Path, read), as_json=as_json)
     refuse_both_on_stdout(output, as_json)
     require_picture(plot)
+    if plot is None:
+        note_no_picture("--plot")
     if output is not None:
         refuse_existing(output, force)
     if len(minimise) > 2:
@@ -101,12 +109,11 @@ def design(
 
         with whole_file(output) as file:
             file.write(dumps(best.mechanism))
-    if plot is not None and best.rounds:
-        write_picture(plot, best.plot)
+    if plot is not None:
+        write_picture(plot, partial(best.plot, **drawn.in_space), drawn)
     print_result(as_json, result)
-    for path, is_there in ((output, best.mechanism), (plot, best.rounds)):
-        if path is not None and not is_there:
-            note(f"{path} is not written: nothing was found")
+    if output is not None and best.mechanism is None:
+        note(f"{output} is not written: nothing was found")
     return int(not result)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,8 +16,11 @@ from .arguments import FINITE, MECH, Triple, load
 from .outputs import (
     OUTPUT,
     STANDARD,
+    PictureOptions,
     check_outputs,
     force_option,
+    note_no_picture,
+    pictured,
     refuse_both_on_stdout,
     refuse_existing,
     require_picture,
@@ -44,6 +48,7 @@ if TYPE_CHECKING:
 @limiting
 @carrying
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help="Picture too: PNG, SVG or PDF.")
+@pictured(with_view=False)
 @json_option()
 def effort(
     mech: str,
@@ -53,6 +58,7 @@ def effort(
     loads: Loads,
     gravity: Triple,
     plot: Path | None,
+    drawn: PictureOptions,
     as_json: bool,
     reading: Reading,
     sample_time: float | None,
@@ -62,7 +68,8 @@ def effort(
     """Tell what motors exert along a path.
 
     PATH is a CSV file or G-code, as of track, with times, feeds or --sample-time; - is standard input. With a limit,
-    such as --speed or --torque, it is followed as fast as `pfabrik time` would, whatever its times.
+    such as --speed or --torque, it is followed as fast as `pfabrik time` would, whatever its times. Without one, the
+    nearest poses are followed where it is out of reach: the answer says where, and the exit code is 1.
 
     Masses [kg] are those of the file and of --load; bodies without one weigh nothing. Gravity is in m/s². Forces are in
     N, torques in N m, power in W.
@@ -70,6 +77,8 @@ def effort(
     refuse_both_on_stdout(output, as_json)
     check_outputs([("-o", output), ("--plot", plot)], [path, Path(mech)], as_json=as_json)
     require_picture(plot)
+    if plot is None:
+        note_no_picture("--plot")
     mechanism = load(mech)
     limits = limits_of(mechanism)
     mechanism = weighed(mechanism, loads)
@@ -88,9 +97,9 @@ def effort(
         if handle is not None:
             found.write(handle)
     if plot is not None:
-        write_picture(plot, found.plot)
+        write_picture(plot, partial(found.plot, **drawn.looks), drawn)
     print_result(as_json, found, to_stderr=output == STANDARD)
-    return int(any(found.reason))
+    return int(any(found.reason) or bool(found.projected.any()))
 
 
 def at_its_times(mechanism: pf.Mechanism, path: paths.Path, sample_time: float | None) -> pf.Track:

@@ -88,18 +88,22 @@ def forces(
     At a pose, home by default. Positive drives a coordinate up. Forces are in any unit, moments and torques in it times
     the unit of length, and masses in the one that --gravity makes such forces of: kg, say, and N.
 
-    With --limit it says too how large a force may come on top of --force and --moment, in whichever direction.
+    With --limit it says too how large a force may come on top, in whichever direction; or, with exit code 1, which
+    actuators would be beyond theirs to hold the load, and by how much.
     """
     if not (force or moment or loads or limits):
         raise click.UsageError("no load: give --force, --moment or --load; or --limit, for what can be held")
-    if loads and limits:
-        raise click.UsageError("--limit goes with --force and --moment, not with --load")
     wrench = (force or (0.0, 0.0, 0.0)) + (moment or ())
-    held = pf.forces(solution, wrench, loads=loads, gravity=gravity)
+    bounds = by_name("--limit", limits, "actuator", actuators(solution.mechanism), bounds_of)
+    held = pf.forces(solution, wrench, loads=loads, gravity=gravity, limits=bounds or None)
     others: dict[str, Result] = {"reactions": held.reactions} if reactions else {}
-    if limits:
-        bounds = by_name("--limit", limits, "actuator", actuators(solution.mechanism), bounds_of)
-        others["capacity"] = pf.wrench_capacity(solution, bounds, wrench=wrench)
+    if bounds and not held.reason:
+        used = pf.forces(solution, wrench, loads=loads, gravity=gravity).actuators.tolist()
+        left: dict[str, tuple[float, float]] = {}
+        for name, force_used in zip(solution.mechanism.actuator_names, used, strict=True):
+            low, high = bound if isinstance(bound := bounds[name], tuple) else (-bound, bound)
+            left[name] = low - force_used, high - force_used
+        others["capacity"] = pf.wrench_capacity(solution, left)
     print_result(as_json, held, others)
     return int(bool(held.reason))
 

@@ -5,6 +5,8 @@ from importlib import import_module
 from typing import Any
 
 PICTURES = {
+    "Design": "design_picture.plot_design",
+    "Efforts": "effort_picture.plot_efforts",
     "SingularityMap": "singular_picture.plot_singular_map",
     "SingularityTrack": "singular_picture.plot_singular_track",
     "PassTrace": "trace_picture.plot_trace",

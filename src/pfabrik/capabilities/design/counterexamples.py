@@ -289,9 +289,10 @@ class SmallestSearch:
             tuple(binding),
             tuple(self.rounds),
             reason,
-            _before=asked.dimensions.named(asked.dimensions.own),
             _bounds=asked.bounds,
             _name=asked.mechanism.name,
+            _machine=asked.mechanism,
+            _reach=asked.reach,
         )
 
     def _binding(self, found: Found, is_found: bool) -> list[Binding]:

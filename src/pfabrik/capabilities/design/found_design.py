@@ -5,18 +5,19 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast, overload
 
 import numpy as np
 
 from ...common.arrays import Floats, as_plain
-from ...common.drawing import SMALL, new_figure
+from ...common.drawing import Size, Theme, View, drawn
 from ...common.printed import Printed, ResultTable
 from ...common.rotations import to_rpy
 from ...errors import InvalidArgument, counted
 from ...machine.description.mechanism import Mechanism
 from ...machine.files import save as save_mechanism
 from ..certify.certificates import Certificate
+from .poses_to_reach import PosesToReach
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -115,9 +116,10 @@ class Design(Printed):
     reason: str = ""
     front: tuple[Design, ...] = ()
     other: float | None = None
-    _before: Mapping[str, float] = field(default_factory=dict)
     _bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     _name: str = ""
+    _machine: Mechanism = field(kw_only=True)
+    _reach: PosesToReach = field(kw_only=True)
 
     def __bool__(self) -> bool:
         """True if a machine was found that reaches all poses, proved or checked."""
@@ -133,7 +135,12 @@ class Design(Printed):
         if self.reason:
             lines.append(self.reason)
         rows = [
-            (name, f"{self._before[name]:.6g}", f"{value:.6g}", *(f"{end:.6g}" for end in self._bounds[name]))
+            (
+                name,
+                f"{self._machine.dimensions[name]:.6g}",
+                f"{value:.6g}",
+                *(f"{end:.6g}" for end in self._bounds[name]),
+            )
             for name, value in self.dimensions.items()
         ]
         header = ("dimension", "before", "found" if self.mechanism else "least broken", "from", "to")
@@ -175,26 +182,27 @@ class Design(Printed):
             raise InvalidArgument("design", f"{self.verdict}: {self.reason}", "a design that was found")
         save_mechanism(self.mechanism, path)
 
-    def plot(self) -> Figure:
-        """The rounds: the aim, and every dimension between its bounds."""
-        figure = new_figure(6.5, 3.2)
-        left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.3))
-        steps = np.arange(1, len(self.rounds) + 1)
-        left.plot(steps, [each.aim for each in self.rounds], "o-", color="#0b5fa5", markersize=4)
-        left.set_xlabel("round", fontsize=SMALL)
-        left.set_ylabel(self.minimised, fontsize=SMALL)
-        for name, (low, high) in self._bounds.items():
-            shares = [(each.dimensions[name] - low) / (high - low) for each in self.rounds]
-            right.plot(steps, shares, "o-", markersize=3, linewidth=1.0, label=name)
-        right.set_ylim(-0.03, 1.03)
-        right.set_xlabel("round", fontsize=SMALL)
-        right.set_ylabel("share of the bounds", fontsize=SMALL)
-        right.legend(fontsize=SMALL - 1, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-        for ax in (left, right):
-            ax.set_xticks(steps[:: max(1, len(steps) // 8)])
-            ax.tick_params(labelsize=SMALL)
-        figure.suptitle(f"{self._name}: {self.verdict}, {self.minimised} {self.aim:.5g}", fontsize=SMALL + 1.0)
-        return figure
+    def plot(self, *, view: View | None = None, size: Size | None = None, theme: Theme = "light") -> Figure:
+        """The machine before, and with the dimensions found, at home and at one scale, with what is to be reached.
+
+        A region has dashed lines around its positions; its middle and corners, or the poses that were given, are
+        orange where the machine does not reach them.
+
+        Parameters
+        ----------
+        view : str or (float, float), optional
+            As in `plot`.
+        size : (float, float), optional
+            Width and height of the figure [inches].
+        theme : {"light", "dark"}, optional
+            As in `plot`.
+
+        Raises
+        ------
+        InvalidArgument
+            No such view, size or theme.
+        """
+        return cast("Figure", drawn(self, view, size, theme))
 
 
 class Designs(Printed, Sequence[Design]):

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...answers.solution import Solution, checked_solution
+from ...answers.status import Status
 from ...answers.tracked import Track, refuse_leaps
 from ...common.arguments import array
-from ...common.arrays import Floats
+from ...common.arrays import Floats, Mask
 from ...common.checks import require_choice
 from ...common.rotations import to_rotvec
 from ...errors import InvalidArgument
@@ -49,8 +51,8 @@ def asked_motion(motion: Any, twists: ArrayLike | None, accelerations: ArrayLike
         return MovingRows(motion.solution, "actuators", motion.rates, motion.accelerations, motion.times)
     solution = checked_solution(motion)
     if isinstance(motion, Track) and not is_given:
-        rates, gains, still = motion_of(motion)
-        return MovingRows(motion, "path", rates, gains, motion.times, still)
+        rates, gains, still, kinks = motion_of(motion)
+        return MovingRows(motion, "path", rates, gains, motion.times, still, kinks)
     n, n_a = len(solution._rows.status), len(solution.mechanism.actuator_names)
     forms, width = (f"... {n_a}", n_a) if at == "actuators" else ("... 6 | ... 3", 6)
     values = []
@@ -66,16 +68,17 @@ def asked_motion(motion: Any, twists: ArrayLike | None, accelerations: ArrayLike
     return MovingRows(solution, at, values[0], values[1], motion.times if isinstance(motion, Track) else None)
 
 
-def motion_of(track: Track) -> tuple[Floats, Floats, Floats]:
+def motion_of(track: Track) -> tuple[Floats, Floats, Floats, Mask]:
     """Rates and accelerations of a path with times, (n, r + n_a) each: of its end effector, and of its actuators.
 
     In the machine's units; those of the polynomial through each step and its neighbours, as the times have them. Also
     the rates up to which actuators are at rest, (n, n_a): what the tolerance of positions makes of none, and any where
-    an actuator is in one place for three steps on end.
+    an actuator is in one place for three steps on end. And a mask of steps with a kink among them and their neighbours:
+    where the nearest pose comes to a limit or leaves it, the velocity leaps.
 
     Raises
     ------
-    InvalidArgument : no times, or such as no motion has; steps that were not reached, or jump.
+    InvalidArgument : no times, or such as no motion has; steps without a feasible pose, or that jump.
     """
     mechanism, times = track.mechanism, track.times
     if times is None:
@@ -86,7 +89,7 @@ def motion_of(track: Track) -> tuple[Floats, Floats, Floats]:
         raise InvalidArgument(
             "track", found, "three steps or more, each later than the one before", rows=stops[:5].tolist()
         )
-    refuse_leaps(track)
+    refuse_leaps(track, Status.PROJECTED)
     k = min(NEIGHBOURS, len(track))
     windows = np.clip(np.arange(len(track)) - k // 2, 0, len(track) - k)[:, None] + np.arange(k)
     late = times[windows] - times[:, None]
@@ -94,8 +97,8 @@ def motion_of(track: Track) -> tuple[Floats, Floats, Floats]:
     powers = np.linalg.inv((late / span[:, None])[..., None] ** np.arange(k))  # coefficients by values, (n, k, k)
     values = [track.pose[windows][..., :3, 3]]
     if not mechanism.end_effector_is_joint:
-        turns = track.pose[windows][..., :3, :3] @ np.swapaxes(track.pose[:, None, :3, :3], -1, -2)
-        values.append(to_rotvec(turns))  # from the step itself: so their second derivative is its acceleration
+        turned = track.pose[windows][..., :3, :3] @ np.swapaxes(track.pose[:, None, :3, :3], -1, -2)
+        values.append(to_rotvec(turned))  # from the step itself: so their second derivative is its acceleration
     along = np.concatenate([*values, track.actuators[windows]], axis=-1)
     first, second = (np.einsum("nk,nkv->nv", powers[:, p], along) for p in (1, 2))
     same = TOLERANCES.position * actuator_units(mechanism)
@@ -104,4 +107,14 @@ def motion_of(track: Track) -> tuple[Floats, Floats, Floats]:
     stays = stays[1:] & stays[:-1]
     for place in range(3):
         still[place : len(still) - 2 + place][stays] = np.inf
-    return first / span[:, None], 2.0 * second / span[:, None] ** 2, still
+    return first / span[:, None], 2.0 * second / span[:, None] ** 2, still, _kinks(track)[windows[:, 1:]].any(axis=1)
+
+
+def _kinks(track: Track) -> Mask:
+    """True for steps of a track that are held by other limits than the one before, (n,); those reached by none."""
+    found, is_off = np.zeros(len(track), bool), track.status != Status.REACHED
+    if is_off.any():
+        all_limits = zip(track.active_limits, is_off.tolist(), strict=True)
+        held = [{(each.joint, each.bound) for each in limits if off} for limits, off in all_limits]
+        found[1:] = [after != before for before, after in pairwise(held)]
+    return found

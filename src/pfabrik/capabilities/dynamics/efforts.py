@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO, cast
 
 import numpy as np
 
+from ...answers.status import Status
+from ...answers.tracked import MOST_NAMED
 from ...common.arrays import Floats, Mask, as_plain, shaped
 from ...common.cells import CsvWriter
-from ...common.drawing import curves_over_time
+from ...common.drawing import Size, Theme, drawn
 from ...common.frozen import FrozenMapping
 from ...common.printed import Printed, ResultTable, plain
 from ...common.whole_files import whole_path
@@ -22,6 +24,7 @@ from ..statics.joint_balance import open_in_words
 from ..statics.loads import Reasons, reasons_in_words
 from .drives import Drives, drives_of
 from .moving_rows import MovingRows
+from .sizing import Sizing, seconds_of, sizing_of
 from .transmitted import transmitted
 
 if TYPE_CHECKING:
@@ -44,6 +47,8 @@ class Efforts(Printed):
         size.
     power : array (..., n_a)
         What each actuator gives to the machine, negative where it brakes [W].
+    projected : array of bool (...)
+        True where the target is out of reach: forces are those of the nearest feasible poses, which the machine takes.
     times : array (n,) or None
         Times of the rows of a path [s]; None for others.
     energy : array (n,) or None
@@ -71,6 +76,11 @@ class Efforts(Printed):
     @property
     def _drives(self) -> Drives:
         return drives_of(self._mechanism)
+
+    @property
+    def projected(self) -> Mask:
+        """See the attributes."""
+        return np.asarray(np.asarray(self._rows.solution.status) == Status.PROJECTED)
 
     @cached_property
     def _transmitted(self) -> tuple[Floats, Mask]:
@@ -104,31 +114,48 @@ class Efforts(Printed):
         """Which of the reactions the motion does not determine, in words; empty if it determines all."""
         return open_in_words(self._mechanism, self._transmitted[1])
 
+    @cached_property
+    def sizing(self) -> Sizing:
+        """What each actuator must do over all rows: rms and peak, rates, power, and what that leaves of its limits."""
+        flat = (np.reshape(x, (-1, len(self._drives.forces))) for x in (self.actuators, self.rates, self.power))
+        exerted, rates, power = flat
+        weights = np.ones(len(exerted)) if self.times is None else seconds_of(self.times)
+        return sizing_of(self._mechanism, exerted, rates, power, weights)
+
     def table(self) -> ResultTable:
-        """What each actuator exerts, its power and speed; of a batch, the largest, and the root mean square."""
-        lines, units = reasons_in_words(self.reason, "no forces"), self._drives.forces
-        exerted, power, rates = (np.reshape(x, (-1, len(units))) for x in (self.actuators, self.power, self.rates))
-        known = np.flatnonzero(~np.isnan(exerted).any(axis=1))
-        if not len(known):
+        """What each actuator exerts, its power and rate; of a batch, its sizing."""
+        lines, limits = reasons_in_words(self.reason, "no forces"), self._drives.limits
+        if np.isnan(self.sizing.rms).any():
             return ResultTable(self._mechanism.name, lines or ["no row"])
-        single, limits, rows = np.ndim(self.actuators) == 1, self._drives.limits, []
-        header = ["actuator", *(["exerts"] if single else ["largest", "rms"]), "unit", "power [W]", "rate"]
-        weights = np.ones(len(known)) if self.times is None or len(known) < 2 else np.gradient(self.times[known])
-        for place, each in enumerate(readouts(self._mechanism)):
-            own, gives = exerted[known, place], power[known, place]
-            moves, most = each.display(rates[known, place]), float(np.abs(own).max())
-            cells = [each.name, plain(_largest(own), 1e-9 * np.abs(exerted[known]).max())]
-            cells += [] if single else [f"{np.sqrt(weights @ own**2 / weights.sum()):.6g}"]
-            cells += [units[place], f"{_largest(gives):.6g}", f"{_largest(moves):.6g} {each.unit}/s"]
-            if np.isfinite(limits).any():
-                cells.append(f"{most / limits[place]:.0%}" if np.isfinite(limits[place]) else "-")
-            rows.append(cells)
-        if np.isfinite(limits).any():
-            header.append("of its limit")
-        remarks = self._resting
+        remarks = self._out_of_reach + self._resting
         if self.energy is not None and self.times is not None and np.isfinite(self.energy[-1]):
-            remarks.append(f"given in all: {self.energy[-1]:.6g} J in {np.ptp(self.times):.6g} s")
+            given = plain(float(self.energy[-1]), 1e-6 * float(np.nanmax(np.abs(self.energy))))
+            remarks.append(f"given in all: {given} J in {np.ptp(self.times):.6g} s")
+        if np.ndim(self.actuators) > 1:
+            return replace(self.sizing.table(), lines=lines, remarks=remarks)
+        header = ["actuator", "exerts", "unit", "power [W]", "rate"] + ["of its limit"] * bool(
+            np.isfinite(limits).any()
+        )
+        rows, least = [], 1e-9 * np.abs(self.actuators).max()
+        for place, each in enumerate(readouts(self._mechanism)):
+            force, rate = self.actuators[place], float(each.display(self.rates[place])) + 0.0
+            cells = [each.name, plain(force, least), self._drives.forces[place]]
+            cells += [f"{self.power[place] + 0.0:.6g}", f"{rate:.6g} {each.unit}/s"]
+            cells += [plain(abs(force) / limits[place] if np.isfinite(limits[place]) else np.nan, -1.0, ".0%")]
+            rows.append(cells[: len(header)])
         return ResultTable(self._mechanism.name, lines, header, rows, remarks)
+
+    @property
+    def _out_of_reach(self) -> list[str]:
+        """The targets whose nearest poses are taken, a sentence if there are any."""
+        rows = np.flatnonzero(self.projected) + 1
+        if not len(rows):
+            return []
+        runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+        named = [f"{run[0]}" if len(run) == 1 else f"{run[0]} to {run[-1]}" for run in runs[:MOST_NAMED]]
+        more = f" and {counted(len(runs) - MOST_NAMED, 'more run')}" if len(runs) > MOST_NAMED else ""
+        which = f": {', '.join(named)}{more}" if np.ndim(self.reason) else ""
+        return [f"out of reach, so forces are those of the nearest poses: {counted(len(rows), 'target')}{which}"]
 
     @property
     def _resting(self) -> list[str]:
@@ -143,12 +170,18 @@ class Efforts(Printed):
         return [f"at rest dry friction counts as 0, and may be up to its size either way: {most}"] * bool(where)
 
     def to_dict(self) -> dict[str, Any]:
-        """Its fields, with power and energy, as plain numbers, lists and texts, ready for JSON."""
-        return {**super().to_dict(), "power": as_plain(self.power), "energy": as_plain(self.energy)}
+        """Its fields, with `projected`, power, energy and sizing, as plain numbers, lists and texts, ready for JSON."""
+        more = {
+            "projected": self.projected.tolist(),
+            "power": as_plain(self.power),
+            "energy": as_plain(self.energy),
+            "sizing": self.sizing.to_dict(),
+        }
+        return {**super().to_dict(), **more}
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write a row for each time: what actuators exert [N m, N], their rates [deg/s, length/s] and power [W], the
-        energy given so far [J], and why there are no forces, where there are none.
+        energy given so far [J], 1 where the target is out of reach, and why there are no forces, where there are none.
 
         The file appears whole or not at all.
 
@@ -169,31 +202,31 @@ class Efforts(Printed):
         writer = CsvWriter(handle)
         header = [f"effort_{each.name}" for each in shown]
         header += [f"rate_{each.name}{'_deg' if each.is_angle else ''}" for each in shown]
-        writer.writerow(["t", *header, *(f"power_{each.name}" for each in shown), "energy", "reason"])
-        for row, reason in zip((numbers + 0.0).tolist(), self.reason, strict=True):
-            writer.writerow([*row, reason])
+        writer.writerow(["t", *header, *(f"power_{each.name}" for each in shown), "energy", "projected", "reason"])
+        for row, is_off, reason in zip((numbers + 0.0).tolist(), self.projected.tolist(), self.reason, strict=True):
+            writer.writerow([*row, int(is_off), reason])
 
     def _require_times(self) -> Floats:
         if self.times is None:
             raise InvalidArgument("efforts", "no path with times", "those of a `track` with times, or of `time_path`")
         return self.times
 
-    def plot(self) -> Figure:
-        """Forces, speeds and power of the actuators over time, one curve each; a Matplotlib figure.
+    def plot(self, *, size: Size | None = None, theme: Theme = "light") -> Figure:
+        """Forces of every actuator over time and over its rate, between its limits, and the power of all.
+
+        Rms and peak are drawn and named; what is at a limit is orange, and times with targets out of reach are grey.
+
+        Parameters
+        ----------
+        size : (float, float), optional
+            Width and height of the figure [inches].
+        theme : {"light", "dark"}, optional
+            As in `plot`.
 
         Raises
         ------
         InvalidArgument
-            Configurations that are no path with times.
+            Configurations that are no path with times; no such size or theme.
         """
-        times, shown = self._require_times(), readouts(self._mechanism)
-        rates = np.stack([each.display(self.rates[:, place]) for place, each in enumerate(shown)], axis=1)
-        forces, units = sorted(set(self._drives.forces)), sorted({f"{each.unit}/s" for each in shown})
-        labels = f"exerts [{', '.join(forces)}]", f"rate [{', '.join(units)}]", "power [W]"
-        panels = dict(zip(labels, (self.actuators, rates, self.power), strict=True))
-        return curves_over_time(times, [each.name for each in shown], panels)
-
-
-def _largest(values: Floats) -> float:
-    """The value of the largest magnitude."""
-    return float(values[np.abs(values).argmax()]) + 0.0
+        self._require_times()
+        return cast("Figure", drawn(self, size, theme))

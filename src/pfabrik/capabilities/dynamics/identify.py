@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...answers.solution import Solution
-from ...answers.tracked import Track
+from ...answers.tracked import Track, refuse_leaps
 from ...common.arguments import any_values, array
 from ...common.arrays import Floats, Mask
 from ...common.batch import take
@@ -91,6 +91,8 @@ def identify(
     InvalidArgument or UnknownName
         A motion that `inverse_dynamics` refuses; efforts of another shape; no body or actuator of a name; no row left.
     """
+    if isinstance(motion, Track):
+        refuse_leaps(motion)
     rows = asked_motion(motion, twists, accelerations, at)
     mechanism, solution = rows.solution.mechanism, rows.solution
     names, movable = mechanism.actuator_names, moving_bodies(mechanism)

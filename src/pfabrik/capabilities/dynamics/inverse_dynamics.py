@@ -23,6 +23,7 @@ from .weights import weights_of
 
 LEFT_FREE = "the loads move a part without inertia that neither the end effector nor an actuator holds"
 NEVER_MADE = "the machine cannot move so here: its task leaves that motion out, or it is at a serial singularity"
+LEAPS = "the velocity leaps here: the nearest pose comes to a limit or leaves it, which no finite forces make it do"
 TOO_LARGE = "its numbers are too large: forces overflow"
 
 
@@ -54,8 +55,8 @@ def inverse_dynamics(
     ----------
     motion : Solution or Track or Timed
         Configurations, at rest unless `twists` or `accelerations` are given. A path with times moves as these say: the
-        polynomial through each step and its four neighbours gives its rates and accelerations. A path of `time_path`
-        moves as that has it.
+        polynomial through each step and its four neighbours gives its rates and accelerations. Where targets are out of
+        reach, it is the nearest poses that move: `projected` says where. A path of `time_path` moves as that has it.
     twists, accelerations : array (..., 6) or (..., 3), optional
         Velocity and acceleration of the reference point, then angular ones, in the base frame [length/s, rad/s; per s];
         three numbers are those of a point. Of these counts what the task sets; the rest follows. With `at` "actuators",
@@ -92,6 +93,7 @@ def inverse_dynamics(
         limits = drives.limits * drives.units
         least, both = exerted[over] * drives.units, np.stack([-limits, limits], axis=1)
         exerted[over] = within_limits(least, found.motions[over], both)[0] / drives.units
+    add_reason(reasons, [] if rows.kinks is None else rows.kinks, LEAPS)
     add_reason(reasons, ~np.isfinite(exerted).all(axis=1), TOO_LARGE)
     lacking = has_reason(reasons)
     if lacking.any():

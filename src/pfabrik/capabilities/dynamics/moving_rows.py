@@ -48,6 +48,7 @@ class MovingRows:
     times : of the rows of a path, (n,) [s].
     still : rates up to which actuators are at rest, by how exactly their places are known, (n, n_a), in the machine's
         units.
+    kinks : True for rows of a path about which its velocity leaps, (n,).
     gravity : (3,) [m/s²].
     """
 
@@ -57,6 +58,7 @@ class MovingRows:
     gains: Floats | None = None
     times: Floats | None = None
     still: Floats | None = None
+    kinks: Mask | None = None
     weights: Weights = field(default_factory=Weights)
     gravity: Floats = field(default_factory=lambda: np.zeros(3))
 

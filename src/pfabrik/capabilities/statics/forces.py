@@ -53,7 +53,7 @@ from .sharing import within_limits
 from .transmission import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated, maps_of
 
 GRAVITY = (0.0, 0.0, -9.81)
-BEYOND = "no forces of the actuators within their limits hold the load: {} would {}"
+BEYOND = "actuators within their limits do not hold the load: {}"
 FREE_PART = "the loads move a part that neither the end effector nor an actuator holds"
 
 
@@ -356,12 +356,15 @@ def forces(
 
 
 def _beyond_in_words(mechanism: Mechanism, limits: Floats, beyond: Floats) -> str:
-    """A reason that names the actuator whose force is farthest beyond its limits (n_a, 2), by (n_a,)."""
-    place = int(np.abs(beyond * actuator_units(mechanism)).argmax())
-    is_above, highest = beyond[place] > 0.0, limits[place, 1]
-    pushes = is_above and highest <= 0.0 < highest + beyond[place]
-    does = "push" if pushes else f"be {'above' if is_above else 'below'} its own"
-    return BEYOND.format(mechanism.actuator_names[place], does)
+    """A reason that names the actuators whose forces are beyond their limits (n_a, 2), and by how much, (n_a,)."""
+    sizes, words = np.abs(beyond * actuator_units(mechanism)), []
+    for place in np.flatnonzero(sizes > TOLERANCES.speed * sizes.max()):
+        name, by, bound = mechanism.actuator_names[place], beyond[place], limits[place, int(beyond[place] > 0.0)]
+        does = "push" if bound <= 0.0 < bound + by else "exert"
+        words.append(
+            f"{name} would {does} {bound + by:.5g}, {abs(by):.5g} {'above' if by > 0.0 else 'below'} its limit"
+        )
+    return BEYOND.format("; ".join(words))
 
 
 def _balanced(question: _Question, q: Floats, rows: slice | NDArray[np.intp], more: Floats | float = 0.0) -> Balance:
