@@ -82,7 +82,7 @@ _POSE_OBJECTIVE = PoseObjective(*_values("F3 F1 i i f f f f i"))
 KERNELS: tuple[tuple[Any, tuple[Any, ...]], ...] = (
     (answer_blocks, tuple(_values("i F3 F3 F2 i1 f3 f2 f2"))),
     (answer, tuple(_values("i F3 F3 f2 i1 f3 f2 f2"))),
-    (close, (*_values("i i i"), ClosureProblem(*_values("F1 i F3 i f i i i f i")), _CLOSED)),
+    (close, (*_values("i i i"), ClosureProblem(*_values("F1 i F3 i f i i i i f i")), _CLOSED)),
     (answer_joints, (*_values("i i i F3 F2"), Answered(*_values("f2 i2 f3 f2 f2")), *_values("i1"))),
     (note_near, tuple(_values("i i F2 i1"))),
     (solve_by_passes, _PASSES),

@@ -78,6 +78,7 @@ CONTROL = np.dtype(
         ("is_damped", "i8"),  # 1 if damping made the last step short
         ("is_restoring", "i8"),  # 1 if feasibility is restored after each step
         ("is_warm", "i8"),  # 1 if a descent goes on from where the last one ended: its multipliers are a good guess
+        ("stays", "i8"),  # 1: no step is longer than what keeps a working mode
         ("closed", "f8"),  # objective at the last feasible configuration
     ]
 )

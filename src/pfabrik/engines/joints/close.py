@@ -153,6 +153,7 @@ def close(
         balls_follow=int(follow),
         undamped=int(undamped or stays),
         stays=int(stays),
+        patience=-1,
         closeness=closeness,
         max_iterations=max_iterations,
     )

@@ -32,6 +32,7 @@ from ..rows import (
 from ..search_constants import BESIDE, LONGEST_IN_MODE, MOST_STEPS, SAME_DISTANCE, SIGHT, TURNED, WORTH
 from ..vectors import copy_table
 from .close_on_target import (
+    close_below,
     close_legs,
     complete,
     copy_closed,
@@ -49,7 +50,17 @@ from .close_on_target import (
     take_nearby,
 )
 from .descend import nearest_of
-from .joint_constants import AGREEMENTS, APART, FEWEST, LONG_CHAIN_STEPS, MOST_CLOSING, NEAR
+from .joint_constants import (
+    AGREEMENTS,
+    APART,
+    FEWEST,
+    LONG_CHAIN_STEPS,
+    MOST_CLOSING,
+    NEAR,
+    NEARLY,
+    PATIENCE,
+    STEPS,
+)
 from .joint_tables import (
     ANSWER,
     ASKED,
@@ -125,7 +136,7 @@ def move_to_held(tables: JointTables, scratch: JointScratch, aim: int, start: Cl
         wished[i, 3] = wished[i, 3] if weights[i] == LOCKED else begin[i, 3]
         for j in range(3):
             wished[i, j] = wished[i, j] if turns else begin[i, j]
-    close_legs(tables, scratch, start, wished, held, int(tables.machine[0]["frame"]), MOST_CLOSING, 1, start)
+    close_legs(tables, scratch, start, wished, held, int(tables.machine[0]["frame"]), MOST_CLOSING, 1, -1, start)
 
 
 @routine
@@ -207,7 +218,7 @@ def choose_start(tables: JointTables, scratch: JointScratch, n_starts: int) -> N
         copy_closed(scratch.begin if k == 0 else scratch.reached, start)
         pose_platform(tables, scratch, start)
         close_legs(
-            tables, scratch, start, start.poses[0], tables.nothing, BASE_AXES, LONG_CHAIN_STEPS, 1, scratch.trial
+            tables, scratch, start, start.poses[0], tables.nothing, BASE_AXES, LONG_CHAIN_STEPS, 1, -1, scratch.trial
         )
         distance = distance_of(tables, scratch, last, scratch.trial)
         if distance < least:
@@ -220,29 +231,34 @@ def choose_start(tables: JointTables, scratch: JointScratch, n_starts: int) -> N
 def project_from(tables: JointTables, scratch: JointScratch, begin: Closed, steps: int, best: Closed) -> float:
     """Fill the configuration that one descent leads to; its distance, with the price of what is held [L].
 
-    What it misses of that by rounding alone is held exactly, where this costs no more.
+    Where it comes to have what is held, it goes on with that held exactly: along the edge that the price has there,
+    steps would be short. That ends the descent if holding costs no more than the price. Else it goes on without.
     """
-    aim, start, trial, tally = (
-        PRICED if tables.holds.shape[0] > 1 else 0,
-        scratch.start,
-        scratch.trial,
-        scratch.tally[0],
-    )
-    copy_closed(begin, start)
-    clear_tally(tally)
-    if not descend_from(tables, scratch, aim, AT_START, steps):
-        return math.inf
-    distance: float = tally["least"]
-    copy_closed(trial, best)
-    position, rotation = errors(tables.task[0], best.poses[0], scratch.target[0], scratch.turn)
-    off = position if tables.holds[aim] == HOLD_POSITION else rotation
-    if aim == PRICED and off <= TURNED * tables.prices[aim, 1] * distance:
+    aim = PRICED if tables.holds.shape[0] > 1 else 0
+    start, tally, pricing = scratch.start, scratch.tally[0], scratch.descent.gradient.pricing[0]
+    share, distance = tables.prices[aim, 1], math.inf
+    copy_closed(begin, best)
+    for turn in range(2):
+        copy_closed(best, start)
+        clear_tally(tally)
+        pricing["edge"] = TURNED * share if aim == PRICED and turn == 0 else 0.0
+        is_ended = descend_from(tables, scratch, aim, AT_START, steps)
+        pricing["edge"] = 0.0
+        if not is_ended:
+            return distance
+        distance = tally["least"]
+        copy_closed(scratch.trial, best)
+        position, rotation = errors(tables.task[0], best.poses[0], scratch.target[0], scratch.turn)
+        if aim != PRICED or (position if tables.holds[aim] == HOLD_POSITION else rotation) > TURNED * share * distance:
+            return distance
         copy_closed(best, start)
         move_to_held(tables, scratch, HELD, start)
         clear_tally(tally)
         if descend_from(tables, scratch, HELD, AT_START, steps) and tally["least"] <= (1.0 + SAME_DISTANCE) * distance:
-            copy_closed(trial, best)
+            copy_closed(scratch.trial, best)
             distance = tally["least"]
+            if tally["cost"] <= tables.prices[aim, 0]:
+                return distance
     return distance
 
 
@@ -253,13 +269,14 @@ def project_anew(
     n_starts: int,
     n_seeds: int,
     moves_start: bool,
+    is_begun: bool,
     steps: int,
     best: Closed,
 ) -> float:
     """Fill the nearest configuration that searches from starts and seeds find; its distance, with the price [L].
 
-    What is held is held at first; where that costs more than its price, it gives way, from there and from the start.
-    Where nothing has it, the price counts from the outset.
+    What is held is held at first; where that costs more than its price, it gives way, from there and from the start,
+    unless a descent is known to have begun there. Where nothing has it, the price counts from the outset.
     """
     least = search_by(tables, scratch, HELD, n_starts, n_seeds, moves_start, steps, best)
     tally = scratch.tally[0]
@@ -270,7 +287,7 @@ def project_anew(
     n_places = 2 if least < math.inf else 1
     if least == math.inf:
         least = (1.0 + BESIDE) * search_by(tables, scratch, COARSE, n_starts, n_seeds, moves_start, steps, best)
-    for place in range(n_places):
+    for place in range(1 if is_begun and least < math.inf else n_places):
         distance = project_from(tables, scratch, best if place == 0 else scratch.begin, steps, scratch.priced)
         if distance < (1.0 - SAME_DISTANCE) * least:
             least = distance
@@ -279,17 +296,13 @@ def project_anew(
 
 
 @routine
-def is_connected(tables: JointTables, scratch: JointScratch, question: Record, closed: Closed) -> bool:
-    """True if steps from the start, in its working mode, lead to a configuration."""
-    target, wished, farthest = scratch.target[0], scratch.aside, 0.0
-    copy_table(target, wished)
-    copy_table(closed.poses[0], target)
-    is_reached = reach(tables, scratch, question)
-    copy_table(wished, target)
+def farthest(tables: JointTables, closed: Closed, other: Closed) -> float:
+    """Largest difference of two configurations in a coordinate [L or rad]."""
+    most = 0.0
     for j in range(closed.coordinates.shape[1]):
         if tables.idle[j] == 0:
-            farthest = max(farthest, abs(closed.coordinates[0, j] - scratch.reached.coordinates[0, j]))
-    return is_reached and farthest <= APART
+            most = max(most, abs(closed.coordinates[0, j] - other.coordinates[0, j]))
+    return most
 
 
 @routine
@@ -298,11 +311,14 @@ def stays_in_mode(tables: JointTables, scratch: JointScratch, question: Record, 
 
     Else `scratch.reached` is where they end.
     """
-    farthest = 0.0
-    for j in range(closed.coordinates.shape[1] if question["keeps_mode"] == 1 else 0):
-        if tables.idle[j] == 0:
-            farthest = max(farthest, abs(closed.coordinates[0, j] - scratch.begin.coordinates[0, j]))
-    return farthest <= LONGEST_IN_MODE or is_connected(tables, scratch, question, closed)
+    target, wished = scratch.target[0], scratch.aside
+    if question["keeps_mode"] == 0 or farthest(tables, closed, scratch.begin) <= LONGEST_IN_MODE:
+        return True
+    copy_table(target, wished)
+    copy_table(closed.poses[0], target)
+    is_reached = reach(tables, scratch, question, -1)
+    copy_table(wished, target)
+    return is_reached and farthest(tables, closed, scratch.reached) <= APART
 
 
 @routine
@@ -316,11 +332,13 @@ def distance_left(tables: JointTables, scratch: JointScratch, closed: Closed) ->
 def project(tables: JointTables, scratch: JointScratch, question: Record, n_starts: int) -> None:
     """Fill `scratch.answer` with the nearest feasible configuration.
 
-    From a start one descent leads to it. Others are searched for only where it leads nowhere, or so far that the start
-    is no answer to a target before this one. The fallback is the start, which is feasible, or nearly.
+    From a start, and in a mode that is to be kept, one descent leads to it, in the latter by steps that keep the mode.
+    Others are searched for only where it leads nowhere; in any mode also where it leads so far that the start is no
+    answer to a target before this one. The fallback is the start, which is feasible, or nearly.
     """
     machine, answer, nearest, last = tables.machine[0], scratch.answer, scratch.nearest, tables.weights.shape[0] - 1
-    n_seeds = 0 if question["keeps_mode"] == 1 else tables.seeds.shape[0]
+    keeps_mode = question["keeps_mode"] == 1
+    n_seeds = 0 if keeps_mode else tables.seeds.shape[0]
     count, moves_start = min(n_starts + n_seeds, machine["descents"]), True
     steps, distance = min(MOST_STEPS, machine["descent_steps"] // count), math.inf
     steps = steps if steps >= FEWEST else 0
@@ -328,15 +346,16 @@ def project(tables: JointTables, scratch: JointScratch, question: Record, n_star
     if count < n_starts or steps == 0:
         choose_start(tables, scratch, n_starts)
         n_starts, n_seeds, moves_start = 1, 0, False
-    if question["has_start"] == 1 and steps > 0:
+    is_begun = (question["has_start"] == 1 or keeps_mode) and steps > 0
+    if is_begun:
         before = distance_left(tables, scratch, scratch.begin)
+        scratch.descent.control[0]["stays"] = question["keeps_mode"]
         distance = project_from(tables, scratch, scratch.begin, steps, answer)
-        if distance < math.inf and not stays_in_mode(tables, scratch, question, answer):
-            distance = math.inf
-        if distance < math.inf and before - distance_left(tables, scratch, answer) <= WORTH:
+        scratch.descent.control[0]["stays"] = 0
+        if distance < math.inf and (keeps_mode or before - distance_left(tables, scratch, answer) <= WORTH):
             return
     if steps > 0:
-        found = project_anew(tables, scratch, n_starts, n_seeds, moves_start, steps, nearest)
+        found = project_anew(tables, scratch, n_starts, n_seeds, moves_start, is_begun, steps, nearest)
         if found < math.inf and not stays_in_mode(tables, scratch, question, nearest):
             found = project_from(tables, scratch, scratch.reached, steps, nearest)
         if found < (1.0 - SAME_DISTANCE) * distance:
@@ -346,7 +365,20 @@ def project(tables: JointTables, scratch: JointScratch, question: Record, n_star
         measure(tables, scratch, scratch.begin)
         copy_closed(scratch.begin, answer)
         if distance_of(tables, scratch, last, answer) == math.inf:
-            close_legs(tables, scratch, scratch.begin, scratch.target[0], tables.whole, BASE_AXES, 0, 1, answer)
+            close_legs(tables, scratch, scratch.begin, scratch.target[0], tables.whole, BASE_AXES, 0, 1, -1, answer)
+
+
+@routine
+def finish(tables: JointTables, scratch: JointScratch) -> None:
+    """Bring an answer that is all but on its target onto it, if that is near."""
+    answer, pose, machine = scratch.answer, scratch.pose, tables.machine[0]
+    is_whole = machine["is_whole"] == 1
+    if not distance_left(tables, scratch, answer) <= NEARLY or (machine["follows"] == 1 and not is_whole):
+        return
+    complete(tables.task[0], scratch.target[0], answer.poses[0], pose)
+    close_below(tables, scratch, answer, pose, is_whole, STEPS, PATIENCE, scratch.trial)
+    if is_feasible(tables, scratch.trial) and farthest(tables, scratch.trial, answer) <= LONGEST_IN_MODE:
+        copy_closed(scratch.trial, answer)
 
 
 @routine
@@ -432,7 +464,8 @@ def answer_row(
     n_starts = 1 if question["keeps_mode"] == 1 or follows or verb == NEAREST else 2
     links.kept[0] = links.pairs.shape[0] if verb == NEAREST else 0
     if verb != NEAREST:
-        is_reached = reach(tables, scratch, question)
+        is_hurried = verb == ANSWER and question["keeps_mode"] == 1
+        is_reached = reach(tables, scratch, question, PATIENCE if is_hurried else -1)
         if is_reached and not keeps_clearance(tables, scratch, scratch.reached):
             is_reached, n_starts, links.kept[0] = False, 1, links.pairs.shape[0]
         note(scratch, TO_CLOSE, AT_START, int(scratch.reached.iterations[0]), 0.0 if is_reached else math.inf)
@@ -445,6 +478,8 @@ def answer_row(
         return OPEN
     clip(tables, scratch.target[0])
     project(tables, scratch, question, n_starts)
+    if verb == ANSWER and question["keeps_mode"] == 1 and links.kept[0] == 0:
+        finish(tables, scratch)
     if links.kept[0] < links.pairs.shape[0] and not keeps_clearance(tables, scratch, scratch.answer):
         links.kept[0] = links.pairs.shape[0]
         project(tables, scratch, question, 1)

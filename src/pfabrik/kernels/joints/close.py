@@ -14,7 +14,7 @@ from ...common.arrays import Floats
 from .._jit import inlined, opener, routine, search
 from ..quaternions import exponential, turn_about_z, turn_ball, yaw_of
 from ..search_constants import BELIEVED, CONTRACTION, FARTHEST_OPENING, NEWTON_STEP
-from .joint_constants import DAMPING, FEW, LEAST_DAMPING, MOST_DAMPING
+from .joint_constants import DAMPING, FEW, LEAST_DAMPING, MOST_DAMPING, PROGRESS
 from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, SLIDE, Closed, ClosureProblem, Layout, Loops
 from .normal_equations import (
     add_cones,
@@ -104,13 +104,13 @@ def factorise_long(A: Floats, size: int, damping: float, L: Floats) -> None:
 
 
 @inlined
-def eliminate(A: Floats, C: Floats, b: Floats, size: int, damping: float, L: Floats, Y: Floats) -> None:
-    """Y = (A + damping)^-1 [C, -b], by Cholesky."""
+def eliminate(A: Floats, C: Floats, b: Floats, G: Floats, size: int, damping: float, L: Floats, Y: Floats) -> None:
+    """Y = (A + damping)^-1 [C, -b], by Cholesky; zero for components of the platform that are held."""
     if size > LONG:
         factorise_long(A, size, damping, L)
     for i in range(size):
         for k in range(6):
-            Y[i, k] = C[i, k]
+            Y[i, k] = C[i, k] if G[k, k] < LOCKED else 0.0
         Y[i, 6] = -b[i]
         for j in range(i + 1 if size <= LONG else 0):
             value = A[i, j]
@@ -121,16 +121,18 @@ def eliminate(A: Floats, C: Floats, b: Floats, size: int, damping: float, L: Flo
             else:
                 L[i, i] = 1.0 / math.sqrt(max(value + damping, damping))
         for k in range(7):
-            value = Y[i, k]
-            for j in range(i):
-                value -= L[i, j] * Y[j, k]
-            Y[i, k] = value * L[i, i]
+            if k == 6 or G[min(k, 5), min(k, 5)] < LOCKED:
+                value = Y[i, k]
+                for j in range(i):
+                    value -= L[i, j] * Y[j, k]
+                Y[i, k] = value * L[i, i]
     for i in range(size - 1, -1, -1):
         for k in range(7):
-            value = Y[i, k]
-            for j in range(i + 1, size):
-                value -= L[j, i] * Y[j, k]
-            Y[i, k] = value * L[i, i]
+            if k == 6 or G[min(k, 5), min(k, 5)] < LOCKED:
+                value = Y[i, k]
+                for j in range(i + 1, size):
+                    value -= L[j, i] * Y[j, k]
+                Y[i, k] = value * L[i, i]
 
 
 @inlined
@@ -156,17 +158,22 @@ def solve_platform(S: Floats, damping: float, twist: Floats) -> None:
 @inlined
 def solve(layout: Layout, damping: float, eq: Equations) -> None:
     """The platform's twist, and in Y's last column the step of every free coordinate."""
+    n_free = 0
     for i in range(6):
+        n_free += 1 if eq.G[i, i] < LOCKED else 0
         for j in range(7):
             eq.S[i, j] = eq.G[i, j]
+        eq.twist[i] = 0.0
     for group in range(len(layout.sizes)):
         size, C, Y = layout.sizes[group], eq.C[group], eq.Y[group]
-        eliminate(eq.A[group], C, eq.b[group], size, damping, eq.factor, Y)
-        for i in range(6):
+        eliminate(eq.A[group], C, eq.b[group], eq.G, size, damping, eq.factor, Y)
+        for i in range(6 if n_free > 0 else 0):
             for s in range(size):
                 for j in range(i + 1):
                     eq.S[i, j] -= C[s, i] * Y[s, j]
                 eq.S[i, 6] += C[s, i] * Y[s, 6]
+    if n_free == 0:
+        return
     solve_platform(eq.S, damping, eq.twist)
     for i in range(6):
         if eq.G[i, i] >= LOCKED:
@@ -256,7 +263,7 @@ def close_row(
     copy_state(trial, best)
     for group in range(closed.gaps.shape[1]):  # where no configuration is a number, none is measured
         closed.gaps[row, group] = math.inf
-    cost, factor, step = math.inf, 1.0, math.inf
+    cost, factor, step, idle = math.inf, 1.0, math.inf, 0
     longest_step = 0.99 * NEWTON_STEP if problem.stays == 1 else math.inf
     iterations, phase = 0, TRY
     while True:
@@ -276,16 +283,18 @@ def close_row(
             turn_equations(eq.frame, layout, eq)
         hold_platform(problem, eq)
         if phase == TRY:
+            idle = 0 if trial_cost < PROGRESS * cost else idle + 1
             if trial_cost < cost or undamped:
                 reduction, cost = cost - trial_cost, trial_cost
                 copy_state(trial, best)
                 store_measures(eq, row, closed)
                 factor = max(factor / 4.0, 1e-3)
-                if is_close(problem, eq) or (reduction <= 1e-13 * cost and not undamped):
+                is_over = (reduction <= 1e-13 * cost and not undamped) or idle == problem.patience
+                if is_close(problem, eq) or is_over:
                     phase = MEASURE
             else:
                 factor *= 8.0
-                phase = MEASURE if step < 1e-12 else RETURN
+                phase = MEASURE if step < 1e-12 or idle == problem.patience else RETURN
                 copy_state(best, trial)
         elif phase == RETURN:
             phase = TRY

@@ -75,11 +75,13 @@ def close_legs(
     frame: int,
     most: int,
     limits: int,
+    patience: int,
     to: Closed,
 ) -> None:
     """Close the legs of a start, within limits or without, below a platform held at a pose; or measure them."""
     closing, machine = scratch.closing, tables.machine[0]
-    problem = ClosureProblem(held, frame, scratch.no_centres, limits, machine["inside"], 1 - limits, 0, 0, CLOSED, most)
+    inside, centres, follow = machine["inside"], scratch.no_centres, 1 - limits
+    problem = ClosureProblem(held, frame, centres, limits, inside, follow, 0, 0, patience, CLOSED, most)
     for j in range(tables.moves.shape[0]):
         to.coordinates[0, j] = start.coordinates[0, j] * (tables.moves[j] if most > 0 else 1.0)
     copy_table(pose, to.poses[0])
@@ -91,12 +93,19 @@ def close_legs(
 
 @routine
 def close_below(
-    tables: JointTables, scratch: JointScratch, start: Closed, pose: Floats, is_whole: bool, most: int, to: Closed
+    tables: JointTables,
+    scratch: JointScratch,
+    start: Closed,
+    pose: Floats,
+    is_whole: bool,
+    most: int,
+    patience: int,
+    to: Closed,
 ) -> None:
     """Close the legs within limits below a platform of which all is held, or what the task sets."""
     held = tables.whole if is_whole else tables.held
     frame = BASE_AXES if is_whole else int(tables.machine[0]["frame"])
-    close_legs(tables, scratch, start, pose, held, frame, most, 1, to)
+    close_legs(tables, scratch, start, pose, held, frame, most, 1, patience, to)
 
 
 @routine
@@ -114,7 +123,7 @@ def pose_platform(tables: JointTables, scratch: JointScratch, closed: Closed) ->
 @routine
 def measure(tables: JointTables, scratch: JointScratch, closed: Closed) -> None:
     """Fill the measures of a configuration, whose platform is posed."""
-    close_legs(tables, scratch, closed, closed.poses[0], tables.whole, BASE_AXES, 0, 1, closed)
+    close_legs(tables, scratch, closed, closed.poses[0], tables.whole, BASE_AXES, 0, 1, -1, closed)
 
 
 @routine
@@ -171,9 +180,9 @@ def put_between(begin: Floats, end: Floats, share: float, turn: Floats, pose: Fl
 
 @routine
 def continue_to(
-    tables: JointTables, scratch: JointScratch, target: Floats, is_whole: bool, limits: int, to: Closed
+    tables: JointTables, scratch: JointScratch, target: Floats, is_whole: bool, limits: int, patience: int, to: Closed
 ) -> None:
-    """Lead the platform from its pose at the start to a target, in steps.
+    """Lead the platform from its pose at the start to a target, in steps; with patience no farther than they close.
 
     Where what is not held jumps on the way, the result is marked as open.
     """
@@ -182,7 +191,7 @@ def continue_to(
     frame = BASE_AXES if is_whole else int(machine["frame"])
     most, n, has_jumped = machine["continuation_steps"], CONTINUATION_STEPS, False
     if most == 0:
-        close_legs(tables, scratch, begin, target, held, frame, MOST_CLOSING * (1 - limits), limits, to)
+        close_legs(tables, scratch, begin, target, held, frame, MOST_CLOSING * (1 - limits), limits, patience, to)
         return
     copy_closed(begin, to)
     copy_table(begin.poses[0], present)
@@ -194,7 +203,9 @@ def continue_to(
         if not is_whole:
             copy_table(wished, scratch.start.poses[0])
             complete(tables.task[0], scratch.start.poses[0], present, wished)
-        close_legs(tables, scratch, to, wished, held, frame, most, limits, to)
+        close_legs(tables, scratch, to, wished, held, frame, most, limits, patience, to)
+        if patience > 0 and not is_feasible(tables, to):
+            break
         has_jumped = has_jumped or differences(to.poses[0], wished) > STRANGE + differences(wished, present)
         copy_table(to.poses[0], present)
     if has_jumped:
@@ -210,10 +221,10 @@ def complete_by_loops(tables: JointTables, scratch: JointScratch, is_step: bool)
     machine, pose, trial = tables.machine[0], scratch.pose, scratch.trial
     held, frame = (tables.held, int(machine["frame"])) if machine["varies"] == 1 else (tables.whole, BASE_AXES)
     most = STEPS if is_step else MOST_CLOSING
-    close_legs(tables, scratch, scratch.begin, pose, held, frame, most, 0, trial)
+    close_legs(tables, scratch, scratch.begin, pose, held, frame, most, 0, -1, trial)
     has_jumped = differences(trial.poses[0], pose) > STRANGE
     if machine["varies"] == 1 and not is_step and (has_jumped or gap_of(trial) > machine["near"]):
-        continue_to(tables, scratch, pose, False, 0, trial)
+        continue_to(tables, scratch, pose, False, 0, -1, trial)
         has_jumped = False
     copy_table(trial.poses[0], pose)
     return not (is_step and has_jumped) and (is_step or gap_of(trial) <= machine["near"])
@@ -268,7 +279,7 @@ def search_from_nearby(tables: JointTables, scratch: JointScratch, is_whole: boo
         place = take_nearby(scratch)
         start_at(tables, tables.nearby[place], best, start)
         complete(tables.task[0], scratch.target[0], tables.nearby_poses[place], scratch.wished)
-        close_below(tables, scratch, start, scratch.wished, is_whole, int(machine["search_steps"]), trial)
+        close_below(tables, scratch, start, scratch.wished, is_whole, int(machine["search_steps"]), -1, trial)
         put_better(tables, trial, best)
 
 
@@ -319,7 +330,7 @@ def search_from_random(
             group = group_of[j]
             if is_pose_fixed and max(best.gaps[0, group], best.excesses[0, group]) <= machine["limit"]:
                 start.coordinates[0, j] = best.coordinates[0, j]
-        close_below(tables, scratch, start, pose, is_whole, int(machine["search_steps"]), trial)
+        close_below(tables, scratch, start, pose, is_whole, int(machine["search_steps"]), -1, trial)
         if is_pose_fixed:
             put_better_legs(tables, scratch, trial, best)
         else:
@@ -343,10 +354,11 @@ def is_beyond_reach(tables: JointTables, pose: Floats) -> bool:
 
 
 @routine
-def reach(tables: JointTables, scratch: JointScratch, question: Record) -> bool:
+def reach(tables: JointTables, scratch: JointScratch, question: Record, patience: int) -> bool:
     """Bring the platform to the target, within limits, into `scratch.reached`; True if it got there.
 
-    In one step and by continuation; if the mode need not be kept, from other configurations and leg by leg.
+    In one step and by continuation; if the mode need not be kept, from other configurations and leg by leg. With
+    patience, not farther than steps make progress.
     """
     machine, task, pose, begin, best = tables.machine[0], tables.task[0], scratch.pose, scratch.begin, scratch.reached
     verb, follows = question["verb"], machine["follows"] == 1
@@ -357,13 +369,17 @@ def reach(tables: JointTables, scratch: JointScratch, question: Record) -> bool:
         return reach_as_expected(tables, scratch, question["leg_by_leg"] == 1)
     if follows:
         is_completed = complete_by_loops(tables, scratch, is_step)
-    close_below(tables, scratch, begin, pose, is_fixed, STEPS if is_step else int(machine["closing_steps"]), best)
+    if patience > 0 and is_beyond:
+        copy_closed(begin, best)
+        return False
+    most = STEPS if is_step else int(machine["closing_steps"])
+    close_below(tables, scratch, begin, pose, is_fixed, most, patience, best)
     if is_step or is_beyond:
         return is_completed and is_feasible(tables, best)
     position, rotation = errors(task, begin.poses[0], pose, scratch.turn)
     is_long = question["keeps_mode"] == 1 and math.hypot(position, rotation) > LONGEST_IN_MODE
     if is_long or not is_feasible(tables, best):
-        continue_to(tables, scratch, pose, is_fixed, 1, scratch.trial)
+        continue_to(tables, scratch, pose, is_fixed, 1, patience, scratch.trial)
         put_better(tables, scratch.trial, best)
     if question["keeps_mode"] == 1 or verb == REACH or machine["has_seeds"] == 0:
         return is_feasible(tables, best)
@@ -388,10 +404,10 @@ def reach_as_expected(tables: JointTables, scratch: JointScratch, leg_by_leg: bo
     the others; once all are near, the pose follows.
     """
     pose, best, near, most = scratch.pose, scratch.reached, scratch.answer, int(tables.machine[0]["closing_steps"])
-    close_below(tables, scratch, scratch.begin, pose, False, most, best)
+    close_below(tables, scratch, scratch.begin, pose, False, most, -1, best)
     if leg_by_leg and not is_feasible(tables, best):
-        close_below(tables, scratch, scratch.begin, pose, True, most, near)
+        close_below(tables, scratch, scratch.begin, pose, True, most, -1, near)
         search_from_random(tables, scratch, pose, True, True, near)
-        close_below(tables, scratch, near, pose, False, most, scratch.trial)
+        close_below(tables, scratch, near, pose, False, most, -1, scratch.trial)
         put_better(tables, scratch.trial, best)
     return is_feasible(tables, best) and not is_flipped(tables, scratch, best.poses[0])

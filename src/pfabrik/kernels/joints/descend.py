@@ -13,9 +13,10 @@ from .._jit import routine, search
 from ..clearance.link_limits import pair_excess
 from ..free_motions import FreeMotions, project, put_multipliers, put_step, restoring_step
 from ..holding import limit_multipliers
+from ..legs.complete_poses import turn_pose
 from ..quaternions import turn_ball
 from ..rows import HOLD_NOTHING
-from ..search_constants import CLOSED, LONGEST_STEP, NEARLY_CLOSED, PROBE, RESTORING
+from ..search_constants import CLOSED, LONGEST_IN_MODE, LONGEST_STEP, NEARLY_CLOSED, PROBE, RESTORING
 from ..sqp import (
     add_products,
     allowed_violation,
@@ -29,6 +30,7 @@ from ..sqp import (
     scale_objective,
     symmetrise,
 )
+from ..vectors import Vec, along, copy_table, cross, dot, vec
 from .linearise_loops import (
     DescentScratch,
     add_anchors,
@@ -36,13 +38,14 @@ from .linearise_loops import (
     add_force,
     begin_pricing,
     cone_excess,
+    is_on_edge,
     linearise,
     open_scratch,
     pose_gradient,
     price_curvature,
     walk_all,
 )
-from .loops import BALL, Closed, Loops, Objective
+from .loops import BALL, LOCKED, Closed, Loops, Objective
 from .path_kinematics import State, add_pair_slope, copy_state, load_row, open_loops, place_links, store_row
 
 
@@ -51,24 +54,39 @@ def lagrangian_gradient(
     loops: Loops, row: int, objective: Objective, state: State, scratch: DescentScratch, out: Floats
 ) -> None:
     """Gradient of the Lagrangian at a configuration, with multipliers of limits and, in `balance`, of the loops."""
-    n, paths, multipliers = len(loops.lo), len(loops.paths) - 1, scratch.hessian.multipliers
     walk_all(loops, state, scratch)
     _, held = pose_gradient(objective.pose, objective.pose.targets[row], state.X, scratch.gradient, True)
-    for j in range(n):
-        out[j] = multipliers[2 * j + 1] - multipliers[2 * j]
+    for j in range(len(loops.lo)):
+        out[j] = 0.0
     add_anchors(row, objective, state, scratch.gradient.unit[0], out)
-    for i in range(6):
-        scratch.force[0, i] = scratch.gradient.force[i]
-        for path in range(1, paths):
-            scratch.force[path, i] = scratch.balance[6 * (path - 1) + i]
-            scratch.force[0, i] -= scratch.force[path, i]
-        for k in range(held):
-            scratch.force[0, i] += scratch.balance[6 * (paths - 1) + k] * scratch.gradient.holds[k, i]
-    for path in range(paths):
+    put_forces(len(loops.paths) - 1, held, scratch)
+    for path in range(len(loops.paths) - 1):
         add_force(loops, path, scratch.force[path], scratch, out)
+    add_limits(loops, objective.pose.margin, state, scratch, out)
+
+
+@routine
+def put_forces(paths: int, held: int, scratch: DescentScratch) -> None:
+    """Fill force and moment at the end of each path: of the objective and of the multipliers in `balance`."""
+    force, balance = scratch.force, scratch.balance
+    for i in range(6):
+        force[0, i] = scratch.gradient.force[i]
+        for path in range(1, paths):
+            force[path, i] = balance[6 * (path - 1) + i]
+            force[0, i] -= force[path, i]
+        for k in range(held):
+            force[0, i] += balance[6 * (paths - 1) + k] * scratch.gradient.holds[k, i]
+
+
+@routine
+def add_limits(loops: Loops, margin: float, state: State, scratch: DescentScratch, out: Floats) -> None:
+    """Add the gradients of all limits, times their multipliers, to `out`."""
+    n, multipliers = len(loops.lo), scratch.hessian.multipliers
+    for j in range(n):
+        out[j] += multipliers[2 * j + 1] - multipliers[2 * j]
     for cone in range(len(loops.cone_angles)):
         if multipliers[2 * n + cone] != 0.0:
-            cone_excess(loops, cone, objective.pose.margin, state, scratch)
+            cone_excess(loops, cone, margin, state, scratch)
             add_cone(loops, cone, multipliers[2 * n + cone], scratch, out)
     offset, links, is_placed = 2 * n + len(loops.cone_angles), scratch.links, False
     for pair in range(links.kept[0]):
@@ -86,36 +104,133 @@ def lagrangian_hessian(
 ) -> float:
     """Reduced Hessian of the Lagrangian at `scratch.best`; its largest diagonal entry.
 
-    By differences of the gradient of the Lagrangian. The multipliers of the loops make this zero at pivot coordinates.
-    What a price bends is added: its edge may be sharper than the differences are wide.
+    Of loops and the end effector from their screws; of cones and links that hold, by differences of their gradients.
+    The multipliers of the loops make the gradient zero at pivot coordinates. What a price bends is added.
     """
-    n, linear, H, trial = len(loops.lo), reduced.linear, scratch.hessian.H, scratch.trial
-    motions = linear.totals[0]["motions"]
-    basis, here, there, along = reduced.basis, scratch.here, scratch.there, scratch.row
+    n, linear, H, full = len(loops.lo), reduced.linear, scratch.hessian.H, scratch.full
+    motions, basis, here, there = linear.totals[0]["motions"], reduced.basis, scratch.here, scratch.there
     for i in range(scratch.balance.shape[0]):
         scratch.balance[i] = 0.0
     lagrangian_gradient(loops, row, objective, scratch.best, scratch, scratch.here)
     scratch.control[0]["equation_multipliers"] = put_multipliers(scratch.here, reduced, scratch.balance)
-    lagrangian_gradient(loops, row, objective, scratch.best, scratch, scratch.here)
     is_priced = objective.pose.price > 0.0
     if is_priced:
         put_priced_forces(loops, scratch, reduced)
-        scratch.gradient.pricing[0]["is_fixed"] = 1
+    held = linear.totals[0]["rows"] - 6 * (len(loops.paths) - 2)
+    put_forces(len(loops.paths) - 1, held, scratch)
+    put_turning(row, objective, held, scratch)
+    put_curvature(loops, objective, scratch)
+    bends = has_bent_limits(loops, scratch)
+    for j in range(n):
+        here[j] = 0.0
+    if bends:
+        add_limits(loops, objective.pose.margin, scratch.best, scratch, scratch.here)
     for a in range(motions):
-        probe = PROBE / math.sqrt(linear.metric[a, a])
         for j in range(n):
-            along[j] = basis[j, a]
-        copy_state(scratch.best, trial)
-        move(loops, scratch.row, probe, trial)
-        lagrangian_gradient(loops, row, objective, trial, scratch, scratch.there)
-        for j in range(n):
-            there[j] = (there[j] - here[j]) / probe
+            there[j] = full[j, reduced.free[a]]
+            for r in range(linear.totals[0]["rank"]):
+                there[j] += full[j, reduced.pivots[r]] * basis[reduced.pivots[r], a]
+        if bends:
+            add_differences(loops, a, objective.pose.margin, scratch, reduced)
         project(there, reduced, H[a])
     if is_priced:
-        scratch.gradient.pricing[0]["is_fixed"] = 0
         place, both, turn = price_curvature(objective.pose, False, scratch.gradient)
         add_products(place, both, turn, scratch.hessian, motions)
     return symmetrise(H, motions)
+
+
+@routine
+def put_curvature(loops: Loops, objective: Objective, scratch: DescentScratch) -> None:
+    """Fill the second derivatives of the objective and the loops by all coordinates, of what was walked last.
+
+    With the screws (v, w) of motions on a path, i before j, those of its end change by dv_j = w_i x v_j and
+    dw_j = w_i x w_j as i moves, and dv_i = w_i x v_j as j does. So force f and moment m there have the derivative
+    w_i . (v_j x f + w_j x m / 2), whose other half is that of the twist's own axes. The motions of one ball do not turn
+    each other's axes.
+    """
+    full, rows, turning, force = scratch.full, scratch.eq.rows, scratch.turning, scratch.force
+    for j in range(full.shape[0]):
+        for i in range(full.shape[0]):
+            full[j, i] = 0.0
+        if j < objective.weights.shape[0]:
+            full[j, j] = scratch.gradient.unit[0] * objective.weights[j]
+    place = scratch.gradient.unit[0] * (scratch.gradient.pricing[0]["by_place"] if objective.pose.price > 0.0 else 1.0)
+    for path in range(len(loops.paths) - 1):
+        f, m = vec(force[path]), vec(force[path, 3:])
+        for visit in range(loops.paths[path], loops.paths[path + 1]):
+            begin = loops.visit_rows[visit]
+            for r in range(begin, loops.visit_rows[visit + 1]):
+                v, w, b = vec(rows[r]), vec(rows[r, 3:]), loops.row_columns[r]
+                bend = cross(v, f)
+                wholly = along(bend, 0.5, cross(w, m))
+                pushed, turned = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+                if path == 0:
+                    pushed = weighted(objective.pose.platform, place, v)
+                    turned = (dot(vec(turning[0]), w), dot(vec(turning[1]), w), dot(vec(turning[2]), w))
+                for i in range(loops.visit_rows[loops.paths[path]], r + 1):
+                    u, t, a = vec(rows[i]), vec(rows[i, 3:]), loops.row_columns[i]
+                    share = dot(t, wholly) if i < begin else 0.5 * (dot(t, bend) + dot(w, cross(u, f)))
+                    share += dot(u, pushed) + dot(t, turned)
+                    full[a, b] += share
+                    if i < r:
+                        full[b, a] += share
+
+
+@routine
+def weighted(platform: Floats, unit: float, v: Vec) -> Vec:
+    """A velocity times the weights of positions, where these are not held."""
+    x, y, z = platform[0], platform[1], platform[2]
+    x, y, z = 0.0 if x == LOCKED else x, 0.0 if y == LOCKED else y, 0.0 if z == LOCKED else z
+    return (unit * x * v[0], unit * y * v[1], unit * z * v[2])
+
+
+@routine
+def put_turning(row: int, objective: Objective, held: int, scratch: DescentScratch) -> None:
+    """Fill the symmetric derivative of the end effector's moment by rotations.
+
+    By differences: with a price, the factors by which it scales forces are kept.
+    """
+    X, gradient, turning, force, paths = scratch.trial.X, scratch.gradient, scratch.turning, scratch.force, 0
+    paths = force.shape[0]
+    gradient.pricing[0]["is_fixed"] = 1
+    for k in range(3):
+        copy_table(scratch.best.X, X)
+        turn_pose(X, (PROBE if k == 0 else 0.0, PROBE if k == 1 else 0.0, PROBE if k == 2 else 0.0))
+        pose_gradient(objective.pose, objective.pose.targets[row], X, gradient, True)
+        for i in range(3):
+            moment = gradient.force[3 + i]
+            for path in range(paths):
+                moment -= force[path, 3 + i]
+            for c in range(held):
+                moment += scratch.balance[6 * (paths - 1) + c] * gradient.holds[c, 3 + i]
+            turning[i, k] = moment / PROBE
+    gradient.pricing[0]["is_fixed"] = 0
+    symmetrise(turning, 3)
+
+
+@routine
+def has_bent_limits(loops: Loops, scratch: DescentScratch) -> bool:
+    """True if a limit that is no range has a multiplier."""
+    multipliers = scratch.hessian.multipliers
+    for c in range(2 * len(loops.lo), multipliers.shape[0]):
+        if multipliers[c] != 0.0:
+            return True
+    return False
+
+
+@routine
+def add_differences(loops: Loops, a: int, margin: float, scratch: DescentScratch, reduced: FreeMotions) -> None:
+    """Add the derivative of the limits' gradients, which `scratch.here` has, along a free motion to `scratch.there`."""
+    row, probe = scratch.row, PROBE / math.sqrt(reduced.linear.metric[a, a])
+    copy_state(scratch.best, scratch.trial)
+    for j in range(len(loops.lo)):
+        row[j] = reduced.basis[j, a]
+    move(loops, scratch.row, probe, scratch.trial)
+    for j in range(len(loops.lo)):
+        row[j] = 0.0
+    add_limits(loops, margin, scratch.trial, scratch, scratch.row)
+    for j in range(len(loops.lo)):
+        scratch.there[j] += (row[j] - scratch.here[j]) / probe
 
 
 @routine
@@ -146,7 +261,8 @@ def move(loops: Loops, step: Floats, share: float, state: State) -> None:
 def take_step(loops: Loops, reduced: FreeMotions, x: Floats, state: State, scratch: DescentScratch) -> float:
     """Take a step of the free motions, with the one that closes the loops to first order; the share that was taken."""
     put_step(x, reduced, scratch.row)
-    share = LONGEST_STEP / max(longest(scratch.row, len(loops.lo)), LONGEST_STEP)
+    most = LONGEST_IN_MODE if scratch.control[0]["stays"] == 1 else LONGEST_STEP
+    share = most / max(longest(scratch.row, len(loops.lo)), most)
     move(loops, scratch.row, share, state)
     return share
 
@@ -182,6 +298,7 @@ def descend(loops: Loops, row: int, objective: Objective, scratch: DescentScratc
     hessian, control, most = scratch.hessian, scratch.control[0], objective.pose.max_iterations
     scratch.gradient.unit[0] = scale_objective(reduced.linear)
     begin_descent(reduced.linear, hessian, control)
+    control["is_done"] = int(is_on_edge(objective.pose, scratch.gradient))
     while control["is_done"] == 0:
         control["largest"] = lagrangian_hessian(loops, row, objective, scratch, reduced)
         is_accepted = False
@@ -196,6 +313,8 @@ def descend(loops: Loops, row: int, objective: Objective, scratch: DescentScratc
                 if is_accepted:
                     copy_state(trial, best)
                     reduced, trial_reduced = trial_reduced, reduced
+                    if is_on_edge(objective.pose, scratch.gradient):
+                        control["is_done"] = 1
             if is_stuck_infeasible(reduced.linear, is_accepted, most, control):
                 if restore_feasibility(loops, row, objective, best, CLOSED, scratch, reduced):
                     resume(control)

@@ -13,7 +13,13 @@ FEW = 100
 """Coordinates of one group up to which the least damping exceeds the rounding errors of the factor. These grow with the
 cube of the number of coordinates, as six equations leave all but six pivots to damping."""
 
+PROGRESS = 0.9
+"""Ratio of squared residuals that a step must reach to count as progress."""
+
 # Closing on a target (`close_on_target`)
+
+PATIENCE = 4
+"""Steps in a row without progress that end a closing where a descent follows: from there that finds what is left."""
 
 STRANGE = 0.1
 """Largest change of components that the task leaves out, beyond which a step is replaced by continuation [L or rad]."""
@@ -42,6 +48,9 @@ AGREEMENTS = 7.0
 NEAR = 2
 """Random feasible configurations, the nearest to a target out of reach, that searches start from, too: on a machine of
 two arms more answers come nearer so than random closings on the target would bring."""
+
+NEARLY = 1e-2
+"""Distance from its target below which loops are closed once more on it, from where a descent ended [L]."""
 
 LONG_CHAIN_STEPS = 20
 """Steps that bring a start of a long chain within its limits."""

@@ -60,6 +60,7 @@ PRICING = np.dtype(
         ("held", "f8"),  # p or r of what is held, where second derivatives were last asked for
         ("eases", "i8"),  # 1 if it fell to a quarter since
         ("cost", "f8"),  # where a descent that held a part ended: that of holding it, as in `TALLY`
+        ("edge", "f8"),  # error of what is held, as a share of the distance, at which a descent ends; 0: at none
     ]
 )
 """The price at a configuration."""
@@ -193,6 +194,17 @@ def price_curvature(objective: PoseObjective, majorises: bool, gradient: PoseGra
 
 
 @routine
+def is_on_edge(objective: PoseObjective, gradient: PoseGradient) -> bool:
+    """True if a descent by a price ends where it is, for what is held is all but held."""
+    pricing, weight = gradient.pricing[0], 1.0
+    held, square = pricing["place"], pricing["place"] + pricing["turn"]
+    if objective.hold == HOLD_ORIENTATION:
+        weight = max(objective.platform[3], max(objective.platform[4], objective.platform[5]))
+        held = pricing["turn"]
+    return bool(objective.price > 0.0 and held <= weight * square * pricing["edge"] * pricing["edge"] and square > 0.0)
+
+
+@routine
 def begin_pricing(gradient: PoseGradient) -> None:
     """Reset what was noted of the price, before a descent."""
     gradient.pricing[0]["held"], gradient.pricing[0]["eases"], gradient.pricing[0]["is_fixed"] = math.inf, 1, 0
@@ -283,6 +295,8 @@ class DescentScratch(NamedTuple):
     balance: Floats  # (rows,): multipliers of the loops and of the held components
     here: Floats  # (columns,)
     there: Floats  # (columns,)
+    full: Floats  # (columns, columns): second derivatives
+    turning: Floats  # (3, 3): those of the end effector's rotation
     margins: Floats  # (limits,): how far inside each limit a descent stays, beyond the margin of all [rad or L]
     links: LinkLimits
     ways: Loops  # a path from the base to the body of each link
@@ -315,6 +329,8 @@ def new_descent_scratch(loops: Loops, links: LinkLimits, ways: Loops) -> Descent
         np.zeros(rows),
         np.zeros(n),
         np.zeros(n),
+        np.zeros((n, n)),
+        np.zeros((3, 3)),
         np.zeros(limits),
         new_link_limits(links),
         ways,

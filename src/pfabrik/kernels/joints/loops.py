@@ -66,6 +66,7 @@ class ClosureProblem(NamedTuple):
     balls_follow: int  # 1: the ball joints of `last_balls` follow the platform; they are locked in the layout
     undamped: int  # 1: undamped steps, also uphill: finds more of many solutions, but not the nearest
     stays: int  # 1: undamped steps while these contract, so that the solution is the start's own
+    patience: int  # steps in a row without progress that end the search; -1: none do
     closeness: float  # largest gap that ends the search
     max_iterations: int
 
