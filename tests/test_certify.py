@@ -376,6 +376,7 @@ def test_what_legs_restrict_without_bounds_is_open() -> None:
     whole = dataclasses.replace(pf.load("tricept"), task=("x", "y", "z", "rotation"))
     for machine, words, more in (
         (ankle, "uncertain", {"uncertain": 0.1}),
+        (pf.load("rps"), "uncertain", {"uncertain": 0.1}),
         (arm, "turntable", {}),
         (whole, "restricts the platform", {}),
     ):
@@ -383,6 +384,8 @@ def test_what_legs_restrict_without_bounds_is_open() -> None:
         half = 1.0 if machine is whole else 0.0
         certificate = pf.certify(machine, PoseRegion.box(at - half, at + half), budget=100, **more)
         assert certificate.verdict == "OPEN" and words in certificate.reason
+    turns = pf.certify(ankle, PoseRegion.joints({"pivot[0]": (-0.1, 0.1)}), uncertain=0.1)
+    assert turns.verdict == "OPEN" and "uncertain" in turns.reason
 
 
 def test_the_command_says_what_the_function_says(tmp_path: Path) -> None:

@@ -31,15 +31,15 @@ class Following(NamedTuple):
 def what_follows(model: Model, region: PoseRegion, uncertain: float) -> Following:
     """Which coordinates follow from the legs over a region: those that its task leaves open, if legs restrict it there,
     and leave as many constraints as they are."""
+    reason = _of_uncertain(model, uncertain)
     if region.path is not None:
-        return Following(np.zeros(6, np.int64), _of_joints(model, region.path))
+        return Following(np.zeros(6, np.int64), reason or _of_joints(model, region.path))
     task, table = task_of(model.mechanism), model.legs
     far = np.abs(np.stack([region.low, region.high])[:, 3:]).max(axis=0)
     middle = region.middle[:3] - model.mechanism.home_pose[:3, 3]
     shifts, turns = np.concatenate([np.diag(region.half[:3]), middle[None]]) / model.length, np.diag(far)
     leg = leg_that_restricts(table, shifts, turns)
     is_open = task.rotations == 2 and bool(far.any())
-    reason = _of_uncertain(model, uncertain)
     if leg < 0 and not is_open:
         return Following(np.zeros(6, np.int64), reason)
     implicit, n_constraints = np.logical_not((*task.axes, *task.turns)), int(table.task["rows"][0])
