@@ -18,17 +18,22 @@ from scipy.spatial.transform import Rotation
 import pfabrik as pf
 from checks import INTERPRETED
 from links import distances_of_pairs, struts
+from machines.closure import ON_ARMS
 from machines.redescribed import moved, relabelled, scaled
 from pfabrik import PoseRegion, Status
-from pfabrik.capabilities.certify.subdividing import region_parameters
+from pfabrik.capabilities.certify.following import what_follows
+from pfabrik.capabilities.certify.subdividing import Subdividing, first_cells, region_parameters, units_of
 from pfabrik.cli import main
 from pfabrik.engines.pose.table import kernel_table
 from pfabrik.kernels.certify.affine_forms import ABOVE, BELOW, CENTRE
-from pfabrik.kernels.certify.limit_rows import put_limits
-from pfabrik.kernels.certify.pose_cells import put_cell
+from pfabrik.kernels.certify.implicit_pose import put_pose
+from pfabrik.kernels.certify.limit_rows import first_link_row, first_reach_row, put_limits
+from pfabrik.kernels.certify.pose_cells import ROTATION_VECTOR, CellParameters, put_cell
 from pfabrik.kernels.certify.prove import new_rows
+from pfabrik.machine.files import loads
 from pfabrik.machine.model import model_of
 
+CATALOG = Path(pf.__file__).parent / "machine" / "catalog"
 CENTRE_OF_STEWART = np.array([0.0, 0.0, 210.0])
 ROD_OF_ORTHOGLIDE = 310.582854123025
 # Machines whose legs leave the region of positions at home's orientation free, and the axes that they move along.
@@ -184,7 +189,7 @@ def test_bounds_of_every_limit_enclose_its_values_on_random_cells(name: str) -> 
         put_cell(parameters, box, cell_rows.cell)
         for s in rng.uniform(-1.0, 1.0, (6, 6)):
             put_cell(parameters, np.concatenate([box[:6] + s * box[6:], np.zeros(6)]), rows.cell)
-            for k in np.unique(rows.owners):
+            for k in np.unique(rows.owners[: first_link_row(table)]):
                 put_limits(table, sides, 0.0, int(k), n, cell_rows)
                 put_limits(table, sides, 0.0, int(k), n, rows)
             form, value = cell_rows.rows, rows.rows[:, CENTRE]
@@ -365,21 +370,22 @@ def test_what_cannot_be_certified_is_refused(error: str, words: str, ask: Callab
         ask()
 
 
-@pytest.mark.parametrize(
-    ("machine", "half", "degrees", "words"),
-    [
-        (pf.load("tricept"), 1.0, 0.0, "restricts the platform"),
-        (pf.load("ankle_ups"), 0.0, 0.0, "no bounds"),
-        # three hinges through a point, which do not reach every rotation
-        (pf.load("agile_eye").without_limits(), 0.0, 6.0, ""),
-    ],
-    ids=["tricept", "ankle_ups", "agile_eye"],
-)
-def test_what_legs_restrict_or_what_has_no_bounds_is_open(
-    machine: pf.Mechanism, half: float, degrees: float, words: str
-) -> None:
-    certificate = pf.certify(machine, box_about(machine.home_pose[:3, 3], half, degrees), budget=100)
-    assert certificate.verdict == "OPEN" and words in certificate.reason
+def test_what_legs_restrict_without_bounds_is_open() -> None:
+    """Legs on an arm that carries others; points that are uncertain; a task that legs do not leave."""
+    ankle, arm = pf.load("ankle_ups"), ON_ARMS["R + 3-RPS + RR"]()
+    whole = dataclasses.replace(pf.load("tricept"), task=("x", "y", "z", "rotation"))
+    for machine, words, more in (
+        (ankle, "uncertain", {"uncertain": 0.1}),
+        (pf.load("rps"), "uncertain", {"uncertain": 0.1}),
+        (arm, "turntable", {}),
+        (whole, "restricts the platform", {}),
+    ):
+        at = machine.home_pose[:3, 3]
+        half = 1.0 if machine is whole else 0.0
+        certificate = pf.certify(machine, PoseRegion.box(at - half, at + half), budget=100, **more)
+        assert certificate.verdict == "OPEN" and words in certificate.reason
+    turns = pf.certify(ankle, PoseRegion.joints({"pivot[0]": (-0.1, 0.1)}), uncertain=0.1)
+    assert turns.verdict == "OPEN" and "uncertain" in turns.reason
 
 
 def test_the_command_says_what_the_function_says(tmp_path: Path) -> None:
@@ -404,6 +410,207 @@ def test_the_command_says_what_the_function_says(tmp_path: Path) -> None:
     for words in (("--tilt", "3"), ("--ball", "1,2,3"), ("--box", "1:2,3:4"), ("--track", str(path), "--tilt", "3")):
         code, text = said(*words)
         assert code == 2 and "certify" in text
+
+
+# Coordinates that follow from the legs, and those of joints
+
+
+def tilts(machine: pf.Mechanism, height: float = 0.0) -> Callable[[float], PoseRegion]:
+    """Regions of tilts up to an angle [rad], within a height to either side of home's."""
+    at, up = machine.home_pose[:3, 3], np.array([0.0, 0.0, height])
+    return lambda tilt: PoseRegion.box(at - up, at + up, tilt=tilt)
+
+
+def angles(machine: pf.Mechanism, **ends: tuple[float, float]) -> Callable[[float], PoseRegion]:
+    """Regions of joint coordinates between shares of ends; `_` stands for what follows a name in brackets."""
+    names = {name.replace("_0", "[0]").replace("_1", "[1]"): end for name, end in ends.items()}
+    return lambda share: PoseRegion.joints({n: (share * a, share * b) for n, (a, b) in names.items()}).of(machine)
+
+
+def own_ankle() -> pf.Mechanism:
+    """Cranks of different lengths about oblique axes, a pivot whose axes are neither square nor along coordinates."""
+    text = (CATALOG / "ankle_rss.toml").read_text(encoding="utf-8")
+    text = text.replace("axes = [[0, 1, 0], [1, 0, 0]]", "axes = [[0.1, 1, 0.2], [1, 0.15, -0.1]]")
+    text = text.replace("at = [-70, 40, 0]\ncone", "at = [-75, 43, 4]\ncone")
+    return loads(text.replace("at = [-40, -40, 0]\naxis = [0, 1, 0]", "at = [-40, -40, 0]\naxis = [0.1, 1, -0.1]"))
+
+
+def own_tripod() -> pf.Mechanism:
+    """3-RRS: cranks with hinged rods, each of another length."""
+    legs = []
+    for i, (crank, top) in enumerate(((50.0, 60.0), (45.0, 66.0), (55.0, 55.0))):
+        turn = Rotation.from_rotvec([0.0, 0.0, 2.0 * np.pi * i / 3.0])
+        foot, elbow, head = turn.apply([[90.0, 0.0, 0.0], [90.0 + crank, 0.0, 20.0], [top, 0.0, 120.0]])
+        axis = turn.apply([0.0, 1.0, 0.0])
+        legs += [
+            pf.Joint(f"A{i}", "revolute", ("base", f"crank{i}"), at=foot, axis=axis, actuated=True, range=(-0.8, 0.8)),
+            pf.Joint(f"B{i}", "revolute", (f"crank{i}", f"rod{i}"), at=elbow, axis=axis, range=(-0.9, 0.9)),
+            pf.Joint(f"C{i}", "spherical", (f"rod{i}", "platform"), at=head),
+        ]
+    return pf.Mechanism("own 3-RRS", legs, "platform", (0.0, 0.0, 120.0), task=("z", "tilt"))
+
+
+def rotations(machine: pf.Mechanism) -> Callable[[float], PoseRegion]:
+    at = machine.home_pose[:3, 3]
+    return lambda half: PoseRegion.box(at, at, rotation=half)
+
+
+def boxes(machine: pf.Mechanism) -> Callable[[float], PoseRegion]:
+    return lambda half: box_about(machine.home_pose[:3, 3], half)
+
+
+FOLLOWING: dict[str, tuple[pf.Mechanism, Callable[[float], PoseRegion], float]] = {
+    name: (machine, make(machine), top)
+    for name, machine, make, top in (
+        ("3-RPS", pf.load("rps"), lambda m: tilts(m, 20.0), 1.0),
+        ("3-PRS", pf.load("prs"), lambda m: tilts(m, 10.0), 1.0),
+        ("Canfield", pf.load("canfield"), tilts, 1.0),
+        ("3-RRS", own_tripod(), lambda m: tilts(m, 5.0), 1.0),
+        ("2-UPS/U", pf.load("ankle_ups"), tilts, 1.0),
+        ("2-RSS/U", pf.load("ankle_rss"), tilts, 1.0),
+        ("G1", pf.load("g1_ankle"), tilts, 1.0),
+        ("own ankle", own_ankle(), tilts, 1.0),
+        ("Tricept", pf.load("tricept"), boxes, 120.0),
+        ("agile eye", pf.load("agile_eye"), rotations, 1.0),
+        ("2-UPS/U pivot", pf.load("ankle_ups"), lambda m: angles(m, pivot_0=(-0.4, 0.6), pivot_1=(-0.4, 0.4)), 1.5),
+        ("2-RSS/U pivot", pf.load("ankle_rss"), lambda m: angles(m, pivot_0=(-0.3, 0.3), pivot_1=(-0.2, 0.2)), 1.5),
+        ("G1 pivot", pf.load("g1_ankle"), lambda m: angles(m, pitch_joint=(-0.8, 0.5), roll_joint=(-0.2, 0.2)), 1.5),
+        ("own ankle pivot", own_ankle(), lambda m: angles(m, pivot_0=(-0.3, 0.3), pivot_1=(-0.2, 0.2)), 1.5),
+        ("Tricept pivot", pf.load("tricept"), lambda m: angles(m, D_0=(-0.5, 0.4), D_1=(-0.5, 0.5)), 1.5),
+    )
+}
+"""Machines of which coordinates follow from the legs, or are joints', regions by size, a size beyond reach."""
+
+
+def drawn_in(region: PoseRegion, n: int, rng: np.random.Generator) -> np.ndarray:
+    """Parameters of a region, most of them on its border."""
+    points = rng.uniform(region.low, region.high, (n, 6))
+    is_end = rng.random(points.shape) < 0.5
+    points = np.where(is_end, np.where(rng.random(points.shape) < 0.5, region.low, region.high), points)
+    if region.turning == "tilt":
+        angle, size = rng.uniform(-np.pi, np.pi, n), region.high[3] * np.sqrt(rng.random(n))
+        size[: 3 * n // 4] = region.high[3]
+        points[:, 3:5] = size[:, None] * np.stack([np.cos(angle), np.sin(angle)], -1)
+    return points
+
+
+def border_by_brute_force(machine: pf.Mechanism, make: Any, top: float, n: int, rng: np.random.Generator) -> float:
+    """The largest size of a region in which no random pose is beyond a limit, by bisection to a thousandth."""
+    low, high = 0.0, top
+    while high - low > 1e-3 * high:
+        middle = 0.5 * (low + high)
+        poses = make(middle).pose(drawn_in(make(middle), n, rng))
+        margin = np.asarray(pf.feasibility(machine, poses).margin)
+        beyond = poses[np.argsort(margin)[:4]][np.sort(margin)[:4] < -1e-9]
+        is_beyond = len(beyond) and (np.asarray(pf.solve_ik(machine, beyond).status) != Status.REACHED).any()
+        low, high = (low, middle) if is_beyond else (middle, high)
+    return low
+
+
+@pytest.mark.skipif(INTERPRETED, reason="thousands of cells take long as plain Python")
+@pytest.mark.parametrize("name", FOLLOWING)
+def test_tilts_are_proved_up_to_the_border_that_brute_force_finds(name: str) -> None:
+    machine, make, top = FOLLOWING[name]
+    rng = np.random.default_rng(len(name))
+    border = border_by_brute_force(machine, make, top, 3000, rng)
+    proved, refuted = (pf.certify(machine, make(share * border)) for share in (0.985, 1.01))
+    assert proved and not len(proved.open_boxes) and refuted.verdict == "REFUTED"
+    poses = make(0.985 * border).pose(drawn_in(make(0.985 * border), 3000, rng))
+    assert (np.asarray(pf.solve_ik(machine, poses).status) == Status.REACHED).all()
+    assert pf.feasibility(machine, poses).margin.min() >= proved.margin - 1e-9
+    refutation = refuted.refutation
+    assert refutation is not None and pf.solve_ik(machine, refutation.pose).status == Status.PROJECTED
+
+
+def test_a_tilted_region_is_replayed_and_says_what_it_is() -> None:
+    for name in ("3-RPS", "2-UPS/U pivot"):
+        machine, make, _ = FOLLOWING[name]
+        certificate = pf.certify(machine, make(0.3))
+        assert certificate and certificate.replay()
+        fewer = dataclasses.replace(certificate, _proved=certificate._proved[1:])
+        assert not fewer.replay()
+        region = certificate.region
+        assert region is not None and (certificate.boxes >= region.low - 1e-12).all()
+        assert (certificate.boxes <= region.high + 1e-12).all()
+    assert "pivot[0]" in repr(region)
+
+
+@pytest.mark.parametrize("name", FOLLOWING)
+def test_poses_of_a_cell_are_within_its_bounds(name: str) -> None:
+    """Implicit coordinates and rows over random cells, against those at answers of `solve_ik`, and at single poses."""
+    machine, make, _ = FOLLOWING[name]
+    rng, model = np.random.default_rng(7), model_of(machine)
+    region = make(6.0 if name == "Tricept" else 0.15)
+    follows = what_follows(model, region, 0.0)
+    parameters = region_parameters(model, region, 0.0, follows.implicit)
+    assert not follows.reason
+    table, sides, n = kernel_table(model.legs), model.legs.home_sides[0], int(parameters.kinds[2])
+    cell, single = [new_subdivision_for(model, parameters) for _ in range(2)]
+    units, origin = units_of(model, region)
+    is_implicit, n_checked = follows.implicit.astype(bool), 0
+    for _ in range(2 if INTERPRETED else 4):
+        half = np.where(is_implicit, 0.0, 10.0 ** rng.uniform(-2.0, -0.5) * parameters.half)
+        middle = parameters.middle + np.where(is_implicit, 0.0, rng.uniform(-0.5, 0.5, 6) * parameters.half)
+        box = np.concatenate([middle, half])
+        assert put_pose(table, sides, parameters, box, cell.rows, cell.implicit)
+        for s in rng.uniform(-1.0, 1.0, (4, 6)):
+            at = box[:6] + s * half
+            answer = pf.solve_ik(machine, region.pose(at * units + origin))
+            assert answer.status == Status.REACHED
+            point, share = np.concatenate([at, np.zeros(6)]), np.where(is_implicit, 0.0, s)
+            if is_implicit.any():
+                exact = as_parameters(answer.pose, parameters, model.length)
+                linear = box[:6] + cell.implicit.slopes @ np.where(is_implicit, 0.0, s * half)
+                off = (exact - linear)[is_implicit]
+                assert (np.abs(off) <= cell.implicit.errors[is_implicit] + 1e-9).all()
+                share[is_implicit] = np.clip(off / cell.implicit.errors[is_implicit], -1.0, 1.0)
+                point[:6] = np.where(is_implicit, exact, at)
+            assert put_pose(table, sides, parameters, point, single.rows, single.implicit)
+            for k in np.flatnonzero(table.legs["proximal"] != 3):
+                put_limits(table, sides, 0.0, int(k), n, cell.rows)
+                put_limits(table, sides, 0.0, int(k), n, single.rows)
+            form, value = cell.rows.rows, single.rows.rows[:, CENTRE]
+            linear = form[:, CENTRE] + form[:, :n] @ share[:n]
+            is_known = np.isfinite(form[:, BELOW]) & np.isfinite(single.rows.rows[:, BELOW])
+            is_known &= np.abs(value - form[:, CENTRE]) < 1.0
+            is_known[first_reach_row(table) :] = False
+            excess = np.maximum(linear + form[:, BELOW] - value, value - linear - form[:, ABOVE])
+            assert (excess[is_known] <= 1e-8).all()
+            n_checked += int(is_known.sum())
+    assert n_checked > 20
+
+
+def new_subdivision_for(model: Any, parameters: CellParameters) -> Any:
+    return Subdividing(model, parameters, first_cells(parameters), math.inf, 1).work
+
+
+def as_parameters(pose: np.ndarray, parameters: CellParameters, length: float) -> np.ndarray:
+    """The parameters of a pose, by SciPy."""
+    found = np.zeros(6)
+    found[:3] = pose[:3, 3] / length
+    if parameters.kinds[0] == ROTATION_VECTOR:
+        found[3:] = Rotation.from_matrix(pose[:3, :3]).as_rotvec()
+        return found
+    across = np.cross([0.0, 0.0, 1.0], pose[:3, 2])
+    sine = np.linalg.norm(across)
+    tilt = across * (math.atan2(sine, pose[2, 2]) / sine if sine > 0.0 else 1.0)
+    found[3:5] = tilt[:2]
+    found[5] = (Rotation.from_rotvec(-tilt) * Rotation.from_matrix(pose[:3, :3])).as_rotvec()[2]
+    return found
+
+
+def test_regions_of_joints_are_refused_by_name() -> None:
+    ankle = pf.load("ankle_ups")
+    for ranges, words in (
+        ({}, "one to 6"),
+        ({"pivot[0]": (0.1, -0.1)}, "smaller one first"),
+        ({"AL[0]": (0.0, 0.1)}, "series"),
+        ({"pivott": (0.0, 0.1)}, "pivot"),
+    ):
+        with pytest.raises(pf.errors.PfabrikError, match=words):
+            pf.certify(ankle, PoseRegion.joints(ranges))
+    with pytest.raises(pf.errors.InvalidArgument, match="machine"):
+        PoseRegion.joints({"pivot[0]": (0.0, 0.1)}).pose(np.zeros(6))
 
 
 # Links

@@ -74,14 +74,28 @@ ax.autoscale_view()
 ax.legend()
 ax.figure.savefig("proved.png", dpi=110)
 
+# ## Tilts, and joints' angles
+#
+# Of a tripod the task sets a height and a tilt; where its platform shifts and twists to follows from the legs. `certify`
+# encloses that too. An ankle may be asked in tilts, or in the angles of its pivot.
+tripod, ankle = pf.load("rps"), pf.load("ankle_rss")
+for degrees in (20, 24):
+    tilts = pf.PoseRegion.box([0, 0, 184], [0, 0, 224], tilt=np.radians(degrees))
+    print(pf.certify(tripod, tilts).verdict, f"up to {degrees} degrees")
+turns = pf.PoseRegion.joints({"pivot[0]": (-0.2, 0.2), "pivot[1]": (-0.15, 0.15)})
+print(pf.certify(ankle, turns).verdict, "in the pivot's angles")
+
+# With `singular=True` it proves too that locked drives hold the platform everywhere: no pose of the region is a parallel
+# singularity.
+print(pf.certify(ankle, turns, singular=True))
+
 # ## What has no proof
 #
-# Machines without closed forms are refused by name. Where a leg restricts the platform (a 3-RPS, a Tricept) the rest of
-# the pose follows from equations that have no bounds yet: such regions are refuted or left open, never proved. The same
-# holds beside dead points, for limits of a pivot's angles, and where only another working mode than home's reaches.
+# Machines without closed forms are refused by name. Legs that others carry, rods that two crossed hinges keep from
+# spinning, tracks of machines whose tasks leave something open, and poses beside dead points are refuted or left open,
+# never proved; so is what only another working mode than home's reaches.
 try:
     pf.certify(pf.load("panda"), narrow)
 except pf.errors.UnsupportedMechanism as error:
     print(error)
-tricept = pf.load("tricept")
-print(pf.certify(tricept, pf.PoseRegion.box(*(tricept.home_pose[:3, 3] + [[-1], [1]]))))
+print(pf.certify(ankle, turns, uncertain=0.1).reason)

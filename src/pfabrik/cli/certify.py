@@ -27,20 +27,41 @@ class RegionOptions:
     rotation: str | None
     tilt: float | None
     yaw: str | None
+    joints: str | None
 
     def of(self, mechanism: pf.Mechanism) -> pf.PoseRegion | Any:
         """The region, or the targets of the path."""
-        shapes = {"--box": self.box, "--cylinder": self.cylinder, "--ball": self.ball, "--track": self.path}
+        shapes = {
+            "--box": self.box,
+            "--cylinder": self.cylinder,
+            "--ball": self.ball,
+            "--joints": self.joints,
+            "--track": self.path,
+        }
         given = [name for name, value in shapes.items() if value]
         if len(given) != 1:
             raise click.UsageError(
-                f"{' and '.join(given) or 'no region'}: give one of --box, --cylinder, --ball, --track"
+                f"{' and '.join(given) or 'no region'}: give one of --box, --cylinder, --ball, --joints, --track"
             )
+        if self.joints is not None:
+            return self._of_joints(mechanism, self.joints)
         if self.path is None:
             return self._region()
         if self.rotation is not None or self.tilt is not None or self.yaw is not None:
             raise click.UsageError("--track has its orientations; leave out --rotation, --tilt and --yaw")
         return pf.read_path(self.path, mechanism).targets
+
+    def _of_joints(self, mechanism: pf.Mechanism, text: str) -> pf.PoseRegion:
+        """The region of coordinates NAME=MIN:MAX with commas between."""
+        if self.rotation is not None or self.tilt is not None or self.yaw is not None:
+            raise click.UsageError("--joints give the orientations; leave out --rotation, --tilt and --yaw")
+        ranges: dict[str, list[float]] = {}
+        for each in text.split(","):
+            name, _, ends = each.partition("=")
+            coordinate = mechanism.coordinates_by_name.get(name.strip())
+            unit = math.radians(1.0) if coordinate is None or coordinate.kind == "angle" else 1.0
+            ranges[name.strip()] = [unit * end for end in numbers_of("--joints", ends, (2,), ":")]
+        return pf.PoseRegion.joints(ranges)
 
     def _region(self) -> pf.PoseRegion:
         turns: dict[str, Any] = {}
@@ -72,6 +93,7 @@ regioned = together(
     click.option("--box", metavar="X1:X2,Y1:Y2,Z1:Z2", help="Positions between these ends [length]; one value fixes."),
     click.option("--cylinder", metavar="X,Y,Z,R,H", help="Positions in a cylinder along z: centre, radius, height."),
     click.option("--ball", metavar="X,Y,Z,R", help="Positions in a ball: centre, radius."),
+    click.option("--joints", metavar="NAME=A:B,...", help="Coordinates of joints in series to the platform [deg]."),
     click.option(
         "--track", "path", type=click.Path(path_type=Path), metavar="FILE", help="Every pose of a path instead."
     ),
@@ -98,6 +120,7 @@ regioned = together(
 )
 @click.option("--budget", type=click.IntRange(min=1), metavar="N", help="Cells to look at, at most.")
 @click.option("--uncertain", type=FINITE, metavar="R", help="For joints that may be so far off their points [length].")
+@click.option("--singular", is_flag=True, help="Prove, too, that no pose is a parallel singularity.")
 @printing_result
 def certify(
     mech: str,
@@ -106,13 +129,14 @@ def certify(
     tolerance: float | None,
     budget: int | None,
     uncertain: float | None,
+    singular: bool,
 ) -> pf.Certificate:
     """Prove that every pose of a region is reached, or find one that is not.
 
     Exit code 0: proved. 1: refuted, by a pose that is printed; or left open.
     """
     mechanism = load(mech)
-    asked: dict[str, Any] = {"tolerance": tolerance, "uncertain": uncertain or 0.0}
+    asked: dict[str, Any] = {"tolerance": tolerance, "uncertain": uncertain or 0.0, "singular": singular}
     if budget is not None:
         asked["budget"] = budget
     chosen = None if limits is None else limits.split(",")

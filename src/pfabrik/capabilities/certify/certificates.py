@@ -21,12 +21,15 @@ from ...kernels.certify.prove import DONE, HALF, PROVED_LEGS
 from ...kinematics import model_of
 from ...machine.description.mechanism import Mechanism
 from .pose_region import PoseRegion
-from .subdividing import Subdividing, first_cells, step_poses
+from .subdividing import Subdividing, first_cells, step_poses, units_of
 
 Verdict = Literal["PROVED", "REFUTED", "OPEN"]
 PROVED: Final = "PROVED"
 REFUTED: Final = "REFUTED"
 OPEN: Final = "OPEN"
+
+SINGULARITY: Final = ("end effector", "singularity")
+"""In place of a limit: a pose on the other side of the parallel singularities than home."""
 
 REPLAYED_HALVINGS = 64
 """Cells that `replay` may look at for each proved one."""
@@ -36,18 +39,18 @@ REPLAYED_POSES = 1000
 
 
 class Refutation(NamedTuple):
-    """A pose that is not reached.
+    """A pose that is not reached; or, where singularities count, one that is beyond a parallel singularity.
 
     Attributes
     ----------
     pose : array (4, 4)
         The pose [length].
     limit : tuple of str
-        The pair (joint, bound), as in `Feasibility`.
+        The pair (joint, bound), as in `Feasibility`; ("end effector", "singularity") of a singularity.
     margin : float
-        By how far the limit is broken, as in `margins`: negative.
+        By how far the limit is broken, as in `margins`: negative; 0 of a singularity.
     answer : Solution
-        Answer of `solve_ik`: PROJECTED, with its distances from the pose.
+        Answer of `solve_ik`: PROJECTED, with its distances from the pose; REACHED beyond a singularity.
     """
 
     pose: Floats
@@ -69,7 +72,8 @@ class Certificate(Printed):
     poses : array (n, 4, 4) or None
         Poses of the track; None for a region.
     verdict : {"PROVED", "REFUTED", "OPEN"}
-        "PROVED": every pose is reached in home's working mode. "REFUTED": `refutation` is not reached. "OPEN".
+        "PROVED": every pose is reached in home's working mode, and none is singular if that was asked for. "REFUTED":
+        `refutation` is not reached, or beyond a singularity. "OPEN".
     margin : float
         A proved lower bound of the margins of all poses, as in `margins`; minus infinity if not proved.
     least_found : float
@@ -108,7 +112,7 @@ class Certificate(Printed):
     @cached_property
     def boxes(self) -> Floats:
         """The boxes on which all limits are proved, (n, 2, 6): low and high ends of the region's parameters [length,
-        rad].
+        rad]. Coordinates that follow from the legs are as in the region.
 
         Of a track, (n, 2, 2): number of the step and share of the way along it.
         """
@@ -126,11 +130,15 @@ class Certificate(Printed):
         """
         if self.verdict != PROVED or not self.is_whole:
             return False
-        cells, first = self._proved, first_cells(self._parameters)
+        cells, first = self._proved.copy(), first_cells(self._parameters)
+        follows = np.flatnonzero(self._parameters.implicit)  # where the search begins there, of each cell
+        cells[:, follows] = self._parameters.middle[follows]
         if not all(self._is_covered(root, cells[self._are_in(root, cells)]) for root in first):
             return False
         budget = REPLAYED_HALVINGS * len(cells)  # bounds of a cell may be a little worse than those of its whole
-        again = Subdividing(model_of(self.mechanism), self._parameters, cells[:, :PROVED_LEGS], math.inf, budget, 0)
+        again = Subdividing(
+            model_of(self.mechanism), self._parameters, self._proved[:, :PROVED_LEGS], math.inf, budget, 0
+        )
         if again.proceed(None) != DONE:
             return False
         poses = self._random_poses(np.random.default_rng(0))
@@ -164,15 +172,17 @@ class Certificate(Printed):
         lines = [f"{self.verdict}  {counted(self.n_cells, 'cell')}"]
         unit, refutation = self.mechanism.length_unit, self.refutation
         if self:
-            lines.append(f"every pose is reached; margin at least {self.margin:.4g}")
+            more = ", and none is singular" if self._parameters.kinds[4] else ""
+            lines.append(f"every pose is reached{more}; margin at least {self.margin:.4g}")
         elif refutation is not None:
             joint, bound = refutation.limit
             x, y, z = refutation.pose[:3, 3].tolist()
             roll, pitch, yaw = np.degrees(to_rpy(refutation.pose[:3, :3])).tolist()
             answer = refutation.answer
             off, turned = float(answer.position_error), math.degrees(float(answer.rotation_error))
+            words = "beyond a singularity" if refutation.limit == SINGULARITY else "not reached"
             lines += [
-                f"not reached: {x:.6g} {y:.6g} {z:.6g} {unit}, roll {roll:.4g}, pitch {pitch:.4g}, yaw {yaw:.4g} deg",
+                f"{words}: {x:.6g} {y:.6g} {z:.6g} {unit}, roll {roll:.4g}, pitch {pitch:.4g}, yaw {yaw:.4g} deg",
                 f"{joint} {bound}: margin {refutation.margin:.4g}; "
                 f"nearest pose {off:.4g} {unit} and {turned:.4g} deg away",
             ]
@@ -192,8 +202,10 @@ class Certificate(Printed):
         if self._parameters.kinds[0] == STEPS:
             ends = np.stack([middle - half, middle + half], axis=1)[:, :, 1::-1]
         else:
-            units = np.array([self.mechanism.characteristic_length] * 3 + [1.0] * 3)
-            ends = np.stack([middle - half, middle + half], axis=1) * units
+            assert self.region is not None
+            units, origin = units_of(model_of(self.mechanism), self.region)
+            middle = np.where(self._parameters.implicit, self._parameters.middle, middle)
+            ends = np.stack([middle - half, middle + half], axis=1) * units + origin
         ends = np.ascontiguousarray(ends)
         ends.setflags(write=False)
         return ends

@@ -12,9 +12,14 @@ from ...tolerances import TOLERANCES
 KEPT = TOLERANCES.implied
 """Part of a unit vector [1] or of a point's offset [L] up to which a constraint counts as kept all over a region."""
 
+MOST_COSINE = 0.9
+"""Cosine of the angle between two hinges from which on their product says too little of it."""
 
-def leg_that_restricts(table: LegTable, shifts: Floats, turns: Floats) -> int:
+
+def leg_that_restricts(table: LegTable, shifts: Floats, turns: Floats, but: int = -1) -> int:
     """The first leg whose constraints may be broken within a region, or are not known to be kept; -1 if there is none.
+
+    Leg `but` does not count.
 
     Parameters
     ----------
@@ -26,7 +31,39 @@ def leg_that_restricts(table: LegTable, shifts: Floats, turns: Floats) -> int:
     for k, leg in enumerate(table.legs):
         owner = owner if leg["proximal"] == K.SHARED else k
         is_known = leg["frame"] in (0, 1) and leg["kind"] in (K.ROD, K.PIVOT)
-        if not is_known or not motion.keeps(leg, table.legs, owner) or not _has_bounds(table, k):
+        if k != but and (not is_known or not motion.keeps(leg, table.legs, owner)):
+            return k
+    return -1
+
+
+def leg_without_bounds(table: LegTable) -> int:
+    """The first leg whose constraints have no bounds over cells; -1 if all have.
+
+    These are constraints of legs that redundant joints carry, and twists of rods but for those between two hinges that
+    are square to each other, or nearly so: a product stands for their angle (`kernels.certify.constraint_rows`).
+    """
+    for k, leg in enumerate(table.legs):
+        if not leg["has_rows"]:
+            continue
+        first, last = leg["base_end_axes"][0], leg["platform_end_axes"][0]
+        is_between_hinges = leg["base_end"] == K.HINGE and leg["platform_end"] == K.HINGE
+        is_between_hinges &= abs(float(first @ last)) < MOST_COSINE and leg["proximal"] == K.NO_PROXIMAL
+        if leg["frame"] not in (0, 1) or leg["kind"] not in (K.ROD, K.PIVOT):
+            return k
+        if leg["kind"] == K.ROD and leg["twists"] and not is_between_hinges:
+            return k
+    return -1
+
+
+def leg_of_joints(table: LegTable, names: set[str]) -> int:
+    """The leg that some joints make up, which gives every pose that they do; -1 if none does."""
+    for k, leg in enumerate(table.legs):
+        is_fixed = not leg["has_proximal"] and leg["proximal"] != K.SHARED and leg["redundant"] < 0
+        if (
+            is_fixed
+            and leg["kind"] in (K.ROD, K.PIVOT)
+            and {each.joint.name for each in table.forms[k].elements} == names
+        ):
             return k
     return -1
 
@@ -39,28 +76,16 @@ def names_of_leg(table: LegTable, leg: int) -> str:
 def joints_without_bounds(table: LegTable) -> str:
     """The joints with a limit on a coordinate without bounds over regions, for messages; empty if there are none.
 
-    These are angles of pivots, and angles of endings other than a hinge or two that cross and let their rod spin.
+    These are angles of a rod's endings other than a hinge or two that cross and let it spin.
     """
     names = []
     for i, coordinate in enumerate(table.limited):
         leg, place = table.legs[coordinate["leg"]], int(coordinate["place"])
         ending = leg["base_end"] if place < K.SLIDE else leg["platform_end"]
         is_known = place in (K.Q_PROXIMAL, K.SLIDE) or ending == K.HINGE or (ending == K.CROSS and not leg["twists"])
-        if leg["kind"] == K.PIVOT:
-            is_known = place >= K.PLATFORM_END
-        if not is_known or leg["kind"] not in (K.ROD, K.PIVOT):
+        if leg["kind"] != K.PIVOT and (not is_known or leg["kind"] != K.ROD):
             names.append(table.limits[2 * i][0])
     return ", ".join(dict.fromkeys(names))
-
-
-def _has_bounds(table: LegTable, k: int) -> bool:
-    """True unless crossed hinges of a rod have to point it somewhere, and no limit of theirs proves that they can."""
-    leg, places = table.legs[k], table.limited["place"][table.limited["leg"] == k]
-    for end, start in (("base_end", K.BASE_END), ("platform_end", K.PLATFORM_END)):
-        is_limited = ((places >= start) & (places < start + 3)).any()
-        if leg[f"{end}_aimed"] == 1 and leg[end] == K.CROSS and not is_limited:
-            return False
-    return True
 
 
 class _RegionMotion:
@@ -97,8 +122,6 @@ class _RegionMotion:
 
     def _keeps_pivot(self, pivot: Record) -> bool:
         """Its centre stays where its slides let it be, and its hinges turn as the platform does."""
-        if pivot["base_end"] == K.TRIPLE and self.turns:  # three hinges do not reach every rotation
-            return False
         fixed = pivot["fixed_rows"][: 3 - pivot["slides"]]
         if pivot["frame"] == 1 and self.turns:
             return False

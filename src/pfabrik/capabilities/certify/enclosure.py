@@ -14,8 +14,8 @@ from ...common.arrays import Floats
 from ...common.rotations import to_rotvec
 from ...common.telling import OnProgress
 from ...errors import InvalidArgument, UnsupportedMechanism
-from ...kernels.certify.pose_cells import BOX, ROTATION_VECTOR, TILT, CellParameters
-from ...kernels.certify.prove import ENCLOSE, HALF, N_COLUMNS
+from ...kernels.certify.pose_cells import BOX, ROTATION_VECTOR, TILT
+from ...kernels.certify.prove import ENCLOSE, HALF, N_COLUMNS, no_parameters
 from ...kinematics import Model
 from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of_leg
 from .pose_region import reach_box
@@ -117,13 +117,8 @@ def enclose(
         none = np.zeros((0, 2, len(axes)))
         return Enclosure(tuple(names), 0.0, 0.0, none, none, 0)
     scale = np.array([model.length] * 3 + [1.0] * 3)
-    parameters = CellParameters(
-        np.array([turning, BOX, 6 if max(axes) > 2 else 3, ENCLOSE]),
-        middle / scale,
-        np.zeros(6),
-        np.zeros((1, 12)),
-        np.zeros((1, 6)),
-        np.zeros(1),
+    parameters = no_parameters()._replace(
+        kinds=np.array([turning, BOX, 6 if max(axes) > 2 else 3, ENCLOSE, 0]), middle=middle / scale
     )
     first = np.zeros((1, N_COLUMNS))
     first[0, :HALF] = middle / scale

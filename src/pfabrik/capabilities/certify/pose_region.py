@@ -1,8 +1,9 @@
-"""Regions of poses: shapes of positions, with boxes of rotation vectors or cones of tilts."""
+"""Regions of poses: shapes of positions, with boxes of rotation vectors or cones of tilts; boxes of joints."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -15,11 +16,15 @@ from ...common.checks import require_angle, require_positive
 from ...common.rotations import from_rotvec
 from ...errors import InvalidArgument
 from ...kernels.legs import records as K
-from ...kinematics import Model
+from ...kinematics import JointPath, Model, joint_path, passive_series
 from ...machine.decomposition.leg_table import LegTable
+from ...machine.description.mechanism import Mechanism
 
 Shape = Literal["box", "cylinder", "ball"]
-Turning = Literal["rotation vector", "tilt"]
+Turning = Literal["rotation vector", "tilt", "joints"]
+
+MOST_JOINTS = 6
+"""Most coordinates of joints in series: a pose has no more."""
 
 MOST_TURN = math.pi
 """Largest component of a rotation vector [rad]: beyond half a turn two vectors give one rotation."""
@@ -27,25 +32,74 @@ MOST_TURN = math.pi
 
 @dataclass(frozen=True, eq=False)
 class PoseRegion:
-    """All poses with a position in a shape and an orientation in a range.
+    """All poses with a position in a shape and an orientation in a range; or those at coordinates of some joints.
 
     Attributes
     ----------
     low, high : array (6,)
         The ends of the six parameters: the position x, y, z of the reference point [length], then the orientation
-        [rad].
+        [rad]. Of joints, the ends of their coordinates [length, rad], and then zeros.
     shape : {"box", "cylinder", "ball"}
         Shape of the positions; a cylinder stands along z, it and a ball touch the ends.
-    turning : {"rotation vector", "tilt"}
+    turning : {"rotation vector", "tilt", "joints"}
         "rotation vector": R = from_rotvec(r), with r between the ends. "tilt": R = from_rotvec([tilt_x, tilt_y, 0])
         Rz(yaw), as in `workspace`, where the tilt is at most the largest `tilt_x`, in any direction. Orientations are
-        relative to that of home.
+        relative to that of home. "joints": the pose is where joints in series lead.
+    names : tuple of str
+        Names of the joints' coordinates; none of other regions.
+    path : JointPath or None
+        The joints of the machine that it was asked of; None of other regions, and before.
     """
 
     low: Floats
     high: Floats
     shape: Shape = "box"
     turning: Turning = "rotation vector"
+    names: tuple[str, ...] = ()
+    path: JointPath | None = None
+
+    @staticmethod
+    def joints(ranges: Mapping[str, ArrayLike]) -> PoseRegion:
+        """The poses at coordinates of joints in series from the base to the end effector.
+
+        Parameters
+        ----------
+        ranges : mapping of str to array (2,)
+            The two ends of coordinates [length, rad], by their names: "pivot[0]", "pivot[1]" of a universal joint,
+            the joint's own of others. Coordinates that are left out stay as at home.
+        """
+        if not ranges or len(ranges) > MOST_JOINTS:
+            raise InvalidArgument("ranges", f"{len(ranges)} coordinates", f"one to {MOST_JOINTS} coordinates")
+        ends = np.zeros((2, 6))
+        for i, (name, given) in enumerate(ranges.items()):
+            ends[:, i] = array(f"ranges['{name}']", given, "2", "two ends")
+            if ends[0, i] > ends[1, i]:
+                raise InvalidArgument(f"ranges['{name}']", f"{ends[:, i].tolist()}", "ends, the smaller one first")
+        return _frozen(ends[0], ends[1], "box", "joints", tuple(ranges))
+
+    def of(self, mechanism: Mechanism) -> PoseRegion:
+        """The region of a machine: of joints, with all coordinates from the base to the end effector in order.
+
+        Raises
+        ------
+        InvalidArgument
+            Joints that are not in series from base to end effector, more than six coordinates, or balls.
+        """
+        if self.turning != "joints":
+            return self
+        by_name, series = mechanism.coordinates_by_name, passive_series(mechanism)
+        joints = dict.fromkeys(by_name[name].joint.name if name in by_name else name for name in self.names)
+        path = joint_path(mechanism, series if joints.keys() <= set(series) else tuple(joints))
+        if len(path.motions) > MOST_JOINTS or any(motion.kind == "ball" for motion in path.motions):
+            raise InvalidArgument("ranges", ", ".join(path.names), f"at most {MOST_JOINTS} hinges and slides in series")
+        path = joint_path(mechanism, tuple(path.names[motion.place] for motion in path.motions))
+        ends = np.zeros((2, 6))
+        ends[:, : len(path.names)] = path.home
+        for i, name in enumerate(self.names):
+            if name not in path.names:
+                raise InvalidArgument("ranges", f"'{name}'", f"coordinates of these: {', '.join(path.names)}")
+            ends[:, path.names.index(name)] = self.low[i], self.high[i]
+        return _frozen(ends[0], ends[1], "box", "joints", path.names, path)
 
     @staticmethod
     def box(
@@ -116,8 +170,13 @@ class PoseRegion:
         return np.asarray(0.5 * (self.high - self.low))
 
     def pose(self, parameters: ArrayLike) -> Floats:
-        """The poses (..., 4, 4) of parameters (..., 6) [length, rad]."""
+        """The poses (..., 4, 4) of parameters (..., 6) [length, rad]; of joints, those `of` a machine."""
         given = array("parameters", parameters, "... 6")
+        if self.turning == "joints":
+            if self.path is None:
+                raise InvalidArgument("region", "a region of joints", "that of a machine: `region.of(mechanism)`")
+            found = self.path.poses(given[..., : len(self.names)].reshape(-1, len(self.names)))
+            return found.reshape(*given.shape[:-1], 4, 4)
         poses = np.zeros((*given.shape[:-1], 4, 4))
         poses[..., :3, 3], poses[..., 3, 3] = given[..., :3], 1.0
         turn = given[..., 3:].copy()
@@ -142,6 +201,9 @@ class PoseRegion:
         return inside if inside.ndim else bool(inside)
 
     def __repr__(self) -> str:
+        if self.turning == "joints":
+            ranges = zip(self.names, self.low.tolist(), self.high.tolist(), strict=False)
+            return f"<PoseRegion {', '.join(f'{name} [{a:g}, {b:g}]' for name, a, b in ranges)}>"
         position = " x ".join(f"[{a:g}, {b:g}]" for a, b in zip(self.low[:3], self.high[:3], strict=True))
         ends = np.degrees(np.stack([self.low[3:], self.high[3:]])).T.tolist()
         turns = " x ".join(f"[{a:g}, {b:g}]" for a, b in ends)
@@ -162,9 +224,20 @@ def _region(ends: Floats, shape: Shape, rotation: Any, tilt: Any, yaw: Any) -> P
     elif rotation is not None:
         turns = _ends("rotation", rotation, (3,))
     low, high = np.concatenate([ends, turns], axis=1)
+    return _frozen(low, high, shape, turning)  # type: ignore[arg-type]
+
+
+def _frozen(
+    low: Floats,
+    high: Floats,
+    shape: Shape,
+    turning: Turning,
+    names: tuple[str, ...] = (),
+    path: JointPath | None = None,
+) -> PoseRegion:
     for end in (low, high):
         end.setflags(write=False)
-    return PoseRegion(low, high, shape, turning)  # type: ignore[arg-type]
+    return PoseRegion(low, high, shape, turning, names, path)
 
 
 def _ends(name: str, value: Any, shape: tuple[int, ...]) -> Floats:

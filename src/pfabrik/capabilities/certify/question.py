@@ -15,7 +15,6 @@ from ...answers.status import Status
 from ...common.arrays import Floats
 from ...common.checks import require_count, require_finite, require_names, require_positive
 from ...common.executors import Workers
-from ...common.rotations import to_rotvec
 from ...common.telling import OnProgress, telling
 from ...errors import InvalidArgument, UnsupportedMechanism
 from ...feasibility import feasibility
@@ -40,8 +39,9 @@ from ...kernels.certify.prove import (
 from ...kinematics import Model, Target, as_targets, model_of, task_of
 from ...machine.description.mechanism import Mechanism, checked_mechanism
 from ...machine.poses import are_poses
-from .certificates import OPEN, PROVED, REFUTED, Certificate, Refutation, Verdict
-from .constraint_legs import joints_without_bounds, leg_that_restricts, names_of_leg
+from .certificates import OPEN, PROVED, REFUTED, SINGULARITY, Certificate, Refutation, Verdict
+from .constraint_legs import joints_without_bounds
+from .following import of_track, what_follows
 from .links_over_cells import bounded_pairs, links_without_bounds
 from .pose_region import PoseRegion, drawn
 from .subdividing import (
@@ -50,8 +50,10 @@ from .subdividing import (
     Subdividing,
     first_cells,
     region_parameters,
+    side_at,
     step_poses,
     track_parameters,
+    units_of,
 )
 
 
@@ -83,13 +85,14 @@ def certify(
     tolerance: float | None = None,
     budget: int = BUDGET,
     uncertain: float = 0.0,
+    singular: bool = False,
     executor: Executor | None = None,
     on_progress: OnProgress | None = None,
 ) -> Certificate:
     """Prove that `solve_ik` reaches every pose of a region, find a pose that it does not reach, or say what is open.
 
     Legs are in home's working mode: what is proved is reached without a change of it. What is refuted is reached in no
-    working mode.
+    working mode. Coordinates that the task leaves open and legs determine are proved to exist, on the side of home.
 
     Parameters
     ----------
@@ -108,6 +111,9 @@ def certify(
     uncertain : float, optional
         Radius of a ball about each joint's point that its true place may be anywhere in [length]: proved for all
         machines with such points and directions of axes as described.
+    singular : bool, optional
+        True to prove, too, that no pose is a parallel singularity: locked drives hold the platform in all of the
+        region, whose determinant keeps the sign that it has at home. For legs with driven lengths or proximal joints.
     executor : Executor, optional
         Of `concurrent.futures`, or one like it, on whose workers parts of the region are looked at; default: here. A
         proof holds either way; its cells are others, and of poses that refute a region it may find another.
@@ -129,12 +135,15 @@ def certify(
     gap, budget, uncertain = _checked(tolerance, budget, uncertain)
     poses = None if isinstance(region, PoseRegion) else _steps(mechanism, region)
     if isinstance(region, PoseRegion):
+        region = region.of(mechanism)
         require_task(mechanism, region)
-        parameters = region_parameters(model, region, uncertain)
+        follows = what_follows(model, region, uncertain)
+        parameters = region_parameters(model, region, uncertain, follows.implicit, singular)
     else:
         assert poses is not None
-        parameters = track_parameters(model, poses, uncertain)
-    ask = _RegionQuestion(model, region if isinstance(region, PoseRegion) else None, poses, parameters)
+        follows = of_track(model, poses, uncertain)
+        parameters = track_parameters(model, poses, uncertain, singular)
+    ask = _RegionQuestion(model, region if isinstance(region, PoseRegion) else None, poses, parameters, follows.reason)
     with telling("certify", on_progress) as tell:
         return ask.answer(gap, budget, executor, tell)
 
@@ -167,9 +176,14 @@ class _RegionQuestion:
     """One region and its machine."""
 
     def __init__(
-        self, model: Model, region: PoseRegion | None, poses: Floats | None, parameters: CellParameters
+        self,
+        model: Model,
+        region: PoseRegion | None,
+        poses: Floats | None,
+        parameters: CellParameters,
+        reason: str = "",
     ) -> None:
-        self.model, self.region, self.poses, self.parameters = model, region, poses, parameters
+        self.model, self.region, self.poses, self.parameters, self.reason = model, region, poses, parameters, reason
 
     def answer(self, gap: float, budget: int, executor: Executor | None, tell: OnProgress | None) -> Certificate:
         """Subdivide until there is a verdict."""
@@ -180,7 +194,8 @@ class _RegionQuestion:
             looked = self._look_elsewhere(executor, first, gap, budget, tell)
         reason, refutation = self._restriction(), looked.refutation
         if refutation is None and not looked.n_doubts and looked.ending in (SPENT, TOO_SMALL):
-            refutation = self._sampled() if len(bounded_pairs(self.model)) else None
+            is_sampled = len(bounded_pairs(self.model)) or self.parameters.implicit.any()
+            refutation = self._sampled() if is_sampled else None
         if refutation is not None:
             least_found = (
                 min(looked.found_margin, refutation.margin) if looked.refutation is None else looked.found_margin
@@ -283,38 +298,32 @@ class _RegionQuestion:
     def _restriction(self) -> str:
         """Why nothing can be proved of the region: a leg that leaves a constraint on its poses; empty if none does."""
         model, table = self.model, self.model.legs
-        home = model.mechanism.home_pose
-        if self.region is not None:
-            ends = np.stack([self.region.low, self.region.high])
-            far = np.abs(ends[:, 3:]).max(axis=0)
-            shifts = np.diag(self.region.half[:3])
-            shifts = np.concatenate([shifts, (self.region.middle[:3] - home[:3, 3])[None]]) / model.length
-            turns = np.diag(far)
-        else:
-            assert self.poses is not None
-            shifts = (self.poses[:, :3, 3] - home[:3, 3]) / model.length
-            turns = np.concatenate([to_rotvec(self.poses[:, :3, :3]), self.parameters.moves[:, 3:]])
-        if task_of(model.mechanism).rotations == 2 and np.any(turns):
-            return "the yaw of the platform follows from its legs, without bounds over regions yet"
-        leg = leg_that_restricts(table, shifts, turns)
-        if leg >= 0:
-            return f"the leg with {names_of_leg(table, leg)} restricts the platform in this region, or carries others"
-        if self.parameters.uncertain[0] > 0.0 and len(table.legs) and table.legs["has_rows"].any():
-            return "with uncertain points, legs restrict the platform"
+        if self.reason:
+            return self.reason
         unknown = joints_without_bounds(table)
         if unknown:
             return f"limits of {unknown} have no bounds over regions yet"
+        if self.parameters.kinds[4] and not self.parameters.signs[1]:
+            return "its determinant with locked drives has no bounds, or vanishes at home"
         pair = links_without_bounds(model)
         return f"the distance of the links {pair} has no bounds over regions yet" if pair else ""
 
     def _refuted(self, parameters: Floats, limit: int) -> Refutation | None:
-        """The refutation by a pose that breaks the limit of a row; None if `solve_ik` reaches it."""
+        """The refutation by a pose that breaks the limit of a row; None if `solve_ik` reaches it.
+
+        Of the last row, by one on the other side of the parallel singularities than home, which is reached.
+        """
         if self.region is not None:
-            units = np.array([self.model.length] * 3 + [1.0] * 3)
-            pose = self.region.pose(parameters * units)
+            units, origin = units_of(self.model, self.region)
+            pose = self.region.pose(parameters * units + origin)
         else:
             assert self.poses is not None
             pose = step_poses(self.model, self.parameters, parameters[None, 1::-1])[0]
+        n_limits = len(self.model.legs.limits) + 2 * len(self.model.legs.legs)
+        if limit == n_limits + ROWS_A_PAIR * len(bounded_pairs(self.model)):
+            answer = solve_ik(self.model.mechanism, pose)
+            is_other = answer.status == Status.REACHED and side_at(self.model, self.parameters, parameters) < 0.0
+            return Refutation(pose, SINGULARITY, 0.0, answer) if is_other else None
         return self._refuted_by(pose, limit)
 
     def _sampled(self) -> Refutation | None:
@@ -402,6 +411,8 @@ def _steps(mechanism: Mechanism, track: Any) -> Floats:
 
 def require_task(mechanism: Mechanism, region: PoseRegion) -> None:
     """Raise if a region spans, or shifts, what the task does not set."""
+    if region.turning == "joints":
+        return
     task, home = task_of(mechanism), mechanism.home_pose
     at_home = np.array([*home[:3, 3], 0.0, 0.0, 0.0])
     turns = task.turns if task.rotations < 3 else (True, True, True)

@@ -6,12 +6,30 @@ import math
 
 import numpy as np
 
-from ...common.arrays import Floats
+from ...common.arrays import Floats, Ints
+from ...common.derived import derived
 from ...common.rotations import from_rotvec, to_rotvec
 from ...common.telling import OnProgress
 from ...engines.pose.table import kernel_table, table_handle
+from ...kernels.certify.implicit_pose import new_implicit, solve_middle
 from ...kernels.certify.link_rows import new_cell_links
-from ...kernels.certify.pose_cells import BALL, BOX, CYLINDER, ROTATION_VECTOR, STEPS, TILT, CellParameters
+from ...kernels.certify.parallel_rows import new_parallel, put_middle, put_parallel
+from ...kernels.certify.pose_cells import (
+    AXIS,
+    BALL,
+    BOX,
+    CYLINDER,
+    JOINTS,
+    N_JOINT_COLUMNS,
+    POINT,
+    ROTATION_VECTOR,
+    SLIDES,
+    STEPS,
+    TILT,
+    TILT_BOX,
+    CellParameters,
+    put_cell,
+)
 from ...kernels.certify.prove import (
     BUDGET,
     ENCLOSE,
@@ -22,12 +40,14 @@ from ...kernels.certify.prove import (
     PROVED_LEGS,
     SPENT,
     Subdivision,
+    new_rows,
     new_subdivision,
+    no_parameters,
     prove,
 )
 from ...kernels.clearance.link_records import NO_LINKS
 from ...kernels.handle import Handle
-from ...kinematics import Model
+from ...kinematics import JointPath, Model
 from .links_over_cells import cell_links
 from .pose_region import PoseRegion
 
@@ -40,36 +60,113 @@ CELLS_A_REPORT = 20_000
 MOST_PROVED, MOST_LEFT = 100_000, 256
 """Proved cells that are kept, and cells too small to be halved that may be left open before a proof is given up."""
 
+MOST_CONDITION = 1e10
+"""Condition up to which the sign of a determinant is more than rounding."""
+
 SHAPES = {"box": BOX, "cylinder": CYLINDER, "ball": BALL}
 
 
-def region_parameters(model: Model, region: PoseRegion, uncertain: float) -> CellParameters:
-    """A region as arrays of the kernel, in terms of L."""
-    units = np.array([model.length] * 3 + [1.0] * 3)
-    turning = TILT if region.turning == "tilt" else ROTATION_VECTOR
-    middle, half = region.middle / units, region.half / units
-    n = 6 if half[3:].any() else 3
-    return CellParameters(
-        np.array([turning, SHAPES[region.shape], n, 0]),
+def region_parameters(
+    model: Model,
+    region: PoseRegion,
+    uncertain: float,
+    implicit: Ints | None = None,
+    is_regular: bool = False,
+) -> CellParameters:
+    """A region as arrays of the kernel, in terms of L; of joints, in terms of how far they are from home.
+
+    Parameters
+    ----------
+    implicit : (6,): 1 of coordinates that follow from the legs.
+    is_regular : True to prove that there is no parallel singularity.
+    """
+    units, origin = units_of(model, region)
+    follows = np.zeros(6, np.int64) if implicit is None else implicit
+    middle, half = (region.middle - origin) / units, region.half / units
+    turning, n = TILT if region.turning == "tilt" else ROTATION_VECTOR, 6 if half[3:].any() or follows.any() else 3
+    joints, ranges = np.zeros((1, N_JOINT_COLUMNS)), np.zeros(0, np.int64)
+    if region.path is not None:
+        turning, n, joints = JOINTS, len(region.names), _joints(model, region.path)
+        columns = region.path.columns.tolist()
+        ranges = np.array([columns.index(c) if c in columns else -1 for c in model.legs.limited["column"]], np.int64)
+    elif follows[3]:
+        turning = ROTATION_VECTOR
+    elif follows[5] and turning == ROTATION_VECTOR:
+        turning = TILT_BOX
+    parameters = CellParameters(
+        np.array([turning, SHAPES[region.shape], n, 0, int(is_regular)]),
         middle,
         half,
         np.zeros((1, 12)),
         np.zeros((1, 6)),
         np.array([uncertain / model.length]),
+        joints,
+        ranges,
+        follows,
+        np.zeros(2),
     )
+    return parameters._replace(signs=home_signs(model, tuple(follows.tolist()), is_regular).copy())
 
 
-def track_parameters(model: Model, poses: Floats, uncertain: float) -> CellParameters:
+def units_of(model: Model, region: PoseRegion) -> tuple[Floats, Floats]:
+    """Units (6,) and origin (6,) of the kernel's parameters [length, rad]."""
+    if region.path is None:
+        return np.array([model.length] * 3 + [1.0] * 3), np.zeros(6)
+    units, origin, n = np.ones(6), np.zeros(6), len(region.names)
+    units[:n] = np.where(region.path.is_angle, 1.0, model.length)
+    origin[:n] = region.path.home
+    return units, origin
+
+
+def _joints(model: Model, path: JointPath) -> Floats:
+    """Joints in series as rows of the kernel; a slide's point, which does not matter, is the next one's."""
+    reference = np.array(model.mechanism.reference_point) / model.length
+    rows = np.zeros((len(path.motions) + 1, N_JOINT_COLUMNS))
+    rows[-1, POINT:] = reference
+    for i in range(len(path.motions) - 1, -1, -1):
+        motion = path.motions[i]
+        is_slide = motion.kind == "slide"
+        rows[i, SLIDES], rows[i, AXIS:POINT] = float(is_slide), motion.sign * np.array(motion.axis)
+        rows[i, POINT:] = rows[i + 1, POINT:] if is_slide else np.array(motion.point) / model.length
+    return rows
+
+
+@derived
+def home_signs(model: Model, implicit: tuple[int, ...], is_regular: bool) -> Floats:
+    """The signs, (2,), at home: of the determinant by which coordinates follow from the legs, and of the whole machine
+    with its drivers locked; 0 of what is not asked for, or vanishes."""
+    table, sides, signs = kernel_table(model.legs), model.legs.home_sides[0], np.zeros(2)
+    home = np.zeros(2 * HALF)
+    home[:3] = model.mechanism.home_pose[:3, 3] / model.length
+    follows = np.array(implicit, np.int64)
+    parameters = no_parameters()._replace(implicit=follows)
+    rows, scratch, n = new_rows(table), new_implicit(int(table.task["rows"][0])), int(follows.sum())
+    if n and solve_middle(table, sides, parameters, home, rows, scratch):
+        signs[0] = np.sign(np.linalg.det(scratch.inverse[:n, :n]))
+    if is_regular:
+        work = new_parallel()
+        put_cell(parameters, home, rows.cell)
+        if put_parallel(table, sides, HALF, rows, work):
+            put_middle(work)
+            signs[1] = np.sign(np.linalg.det(work.matrix[:, :HALF]))
+    return signs
+
+
+def track_parameters(model: Model, poses: Floats, uncertain: float, is_regular: bool = False) -> CellParameters:
     """The steps between poses (n, 4, 4) as arrays of the kernel."""
     positions, rotations = poses[:, :3, 3] / model.length, poses[:, :3, :3]
     turns = to_rotvec(rotations[1:] @ np.swapaxes(rotations[:-1], 1, 2))
     return CellParameters(
-        np.array([STEPS, BOX, 1, 0]),
+        np.array([STEPS, BOX, 1, 0, int(is_regular)]),
         np.zeros(6),
         np.zeros(6),
         np.concatenate([positions[:-1], rotations[:-1].reshape(-1, 9)], axis=1),
         np.concatenate([np.diff(positions, axis=0), turns], axis=1),
         np.array([uncertain / model.length]),
+        np.zeros((1, N_JOINT_COLUMNS)),
+        np.zeros(0, np.int64),
+        np.zeros(6, np.int64),
+        home_signs(model, (0,) * 6, is_regular).copy(),
     )
 
 
@@ -92,6 +189,20 @@ def first_cells(parameters: CellParameters) -> Floats:
     cells[:, 0] = cells[:, HALF] = 0.5
     cells[:, 1] = np.arange(len(cells))[::-1]
     return cells
+
+
+def side_at(model: Model, parameters: CellParameters, point: Floats) -> float:
+    """Side of the parallel singularities of a pose, given by parameters (6,): 1 as home, -1, or 0 if too near."""
+    table, rows, work = kernel_table(model.legs), new_rows(kernel_table(model.legs)), new_parallel()
+    box = np.concatenate([point, np.zeros(HALF)])
+    put_cell(parameters, box, rows.cell)
+    if not put_parallel(table, model.legs.home_sides[0], int(parameters.kinds[2]), rows, work):
+        return 0.0
+    put_middle(work)
+    matrix = work.matrix[:, :HALF]
+    if not np.linalg.cond(matrix) < MOST_CONDITION:
+        return 0.0
+    return float(np.sign(np.linalg.det(matrix)) * parameters.signs[1])
 
 
 class Subdividing:

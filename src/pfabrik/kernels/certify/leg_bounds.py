@@ -44,7 +44,7 @@ from .affine_forms import (
     put_turned,
     put_unknown,
 )
-from .pose_cells import CHORD, CURVATURE, ROUNDING, SHIFT, PoseCell, moved_by
+from .pose_cells import BEND, CHORD, CURVATURE, ROUNDING, SHIFT, PoseCell, moved_by
 
 # Sine of the angle between rod and lever or rail below which a coordinate is enclosed as beside a dead point: its
 # remainder grows with the inverse.
@@ -85,7 +85,8 @@ def put_end(leg: Record, reference: Vec, cell: PoseCell, n: int, uncertain: floa
     for i in range(n):
         put(end[i], scale(-1.0, turned_back(pose, moved_by(cell.motions[i], lever))))
     put(end[CENTRE], add(turned_back(pose, lever), reference))
-    error, away = sizes[CURVATURE] * reach + sizes[CHORD] * sizes[SHIFT], sizes[SHIFT] + sizes[CHORD] * reach
+    error = sizes[CURVATURE] * reach + sizes[CHORD] * sizes[SHIFT] + sizes[BEND]
+    away = sizes[SHIFT] + sizes[CHORD] * reach
     rounded = ROUNDING * (norm(p) + norm(point) + norm(reference) + away)
     put_bounds(end, n, error + uncertain + rounded, away + uncertain + rounded)
 
@@ -99,7 +100,7 @@ def put_platform_point(point: Vec, reference: Vec, cell: PoseCell, n: int, uncer
     for i in range(n):
         put(end[i], moved_by(cell.motions[i], lever))
     put(end[CENTRE], add(lever, p))
-    error, away = sizes[CURVATURE] * reach, sizes[SHIFT] + sizes[CHORD] * reach
+    error, away = sizes[CURVATURE] * reach + sizes[BEND], sizes[SHIFT] + sizes[CHORD] * reach
     rounded = ROUNDING * (norm(p) + norm(point) + norm(reference) + away)
     put_bounds(end, n, error + uncertain + rounded, away + uncertain + rounded)
 
@@ -178,16 +179,21 @@ def put_crank(rod: Record, n: int, uncertain: float, bounds: LegBounds) -> bool:
     D = dot(v, velocity)
     if not abs(D) > NEAR_DEAD_POINT * length * speed:
         return False
-    travel = 0.0
+    travel, square = 0.0, 0.0
     for i in range(n):
         q[i] = dot(v, vec(end[i])) / D
         travel += abs(q[i])
+        put(bounds.span[i], along(vec(end[i]), -q[i], velocity))
+        for j in range(i):
+            square += 2.0 * abs(dot(vec(bounds.span[i]), vec(bounds.span[j])))
+        square += dot(vec(bounds.span[i]), vec(bounds.span[i]))
+    linear = math.sqrt(square) * (1.0 + ROUNDING)
     gap = abs(length - rod["length"]) * (length + rod["length"]) + 2.0 * uncertain * (length + uncertain)
     gap += ROUNDING * (1.0 + length + norm(base_end)) ** 2
     error, bent, away = 0.0, 0.0, 0.0
     for step in range(3):
         bent = end[BOUNDS, ERROR] + 0.5 * speed * (travel + error) * (travel + error)
-        away = end[BOUNDS, AWAY] + speed * travel + bent + speed * error
+        away = min(end[BOUNDS, AWAY] + speed * travel, linear) + bent + speed * error
         if step < 2:
             error = 0.75 * (gap + 2.0 * length * bent + away * away) / abs(D)
     q[CENTRE], q[BELOW], q[ABOVE] = bounds.values[Q_PROXIMAL], -error, error
@@ -290,3 +296,17 @@ def put_platform_line(rod: Record, cell: PoseCell, n: int, bounds: LegBounds) ->
             put(line[i], turned_back(pose, sub(vec(span[i]), cross(vec(cell.motions[i, 3:]), v))))
     error = span[BOUNDS, ERROR] + sizes[CURVATURE] * length + sizes[CHORD] * span[BOUNDS, AWAY] + ROUNDING * length
     put_bounds(line, n, error, span[BOUNDS, AWAY] + sizes[CHORD] * length + ROUNDING * length)
+
+
+@routine
+def put_direction(frame: int, v: Vec, cell: PoseCell, n: int, w: Floats) -> None:
+    """A direction of the body at a leg's platform end, in the body of its base end: R v, or R^T v of a reversed leg."""
+    pose, sizes, length = cell.pose, cell.sizes, norm(v)
+    is_forward = frame == FROM_BASE
+    put(w[CENTRE], turn(pose, v) if is_forward else turned_back(pose, v))
+    c = vec(w[CENTRE])
+    for i in range(n):
+        spin = vec(cell.motions[i, 3:])
+        put(w[i], cross(spin, c) if is_forward else scale(-1.0, turned_back(pose, cross(spin, v))))
+    rounded = ROUNDING * length
+    put_bounds(w, n, sizes[CURVATURE] * length + rounded, sizes[CHORD] * length + rounded)

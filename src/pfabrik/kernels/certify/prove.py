@@ -16,14 +16,17 @@ from ...common.arrays import Floats, Ints
 from .._jit import opener, routine, search
 from ..clearance.link_records import NO_LINKS
 from ..legs.records import SAMPLE, SHARED, Table, open_table
-from ..vectors import copy_row
-from .affine_forms import ABOVE, BELOW, CENTRE, least, most
+from ..vectors import copy_row, norm, vec
+from .affine_forms import ABOVE, BELOW, CENTRE, least, most, put_unknown
+from .implicit_pose import ImplicitPose, has_implicit, new_implicit, put_pose
 from .leg_bounds import new_bounds
 from .limit_rows import LimitRows, first_link_row, margin_of, put_limits
 from .link_rows import ROWS_A_PAIR, CellLinks, least_row_of_pair, new_cell_links, put_link_ends, put_pair
+from .parallel_rows import ParallelRows, is_regular, new_parallel, put_parallel
 from .pose_cells import (
     BALL,
     BOX,
+    N_JOINT_COLUMNS,
     N_PARAMETERS,
     ROUNDING,
     STEPS,
@@ -118,6 +121,8 @@ class Subdivision(NamedTuple):
     cells: Floats  # (3, N_COLUMNS): scratch
     rows: LimitRows
     links: CellLinks
+    implicit: ImplicitPose
+    parallel: ParallelRows
 
 
 def new_rows(table: Table, n_pairs: int = 0) -> LimitRows:
@@ -132,10 +137,12 @@ def new_rows(table: Table, n_pairs: int = 0) -> LimitRows:
             leaders[table.cones["leg"]],
             np.repeat(leaders, 2),
             np.repeat(n_legs + np.arange(n_pairs), ROWS_A_PAIR),
+            [n_legs + n_pairs],
         ]
     )
-    rows, spreads = np.zeros((len(owners), 9)), np.zeros((n_legs + n_pairs, N_PARAMETERS))
-    return LimitRows(rows, owners.astype(np.int64), spreads, new_cell(), new_bounds())
+    rows, spreads = np.zeros((len(owners), 9)), np.zeros((n_legs + n_pairs + 1, N_PARAMETERS))
+    joints = np.full(len(table.limited), -1)
+    return LimitRows(rows, owners.astype(np.int64), spreads, joints, new_cell(), new_bounds())
 
 
 def new_subdivision(
@@ -147,6 +154,9 @@ def new_subdivision(
     n_shares: int = 0,
 ) -> Subdivision:
     """Allocate a subdivision; `sizes` are the numbers of cells of the stack, proved and left open."""
+    rows = new_rows(table, len(links.limits.pairs))
+    if len(parameters.ranges):
+        rows.joints[:] = parameters.ranges
     return Subdivision(
         parameters,
         sides,
@@ -158,15 +168,26 @@ def new_subdivision(
         np.full(N_MEASURES, np.inf),
         np.zeros(N_PARAMETERS),
         np.zeros((3, N_COLUMNS)),
-        new_rows(table, len(links.limits.pairs)),
+        rows,
         links,
+        new_implicit(int(table.task["rows"][0])),
+        new_parallel(),
     )
 
 
 def no_parameters() -> CellParameters:
     """Parameters of a region without poses."""
     return CellParameters(
-        np.zeros(4, np.int64), np.zeros(6), np.zeros(6), np.zeros((1, 12)), np.zeros((1, 6)), np.zeros(1)
+        np.zeros(5, np.int64),
+        np.zeros(6),
+        np.zeros(6),
+        np.zeros((1, 12)),
+        np.zeros((1, 6)),
+        np.zeros(1),
+        np.zeros((1, N_JOINT_COLUMNS)),
+        np.zeros(0, np.int64),
+        np.zeros(6, np.int64),
+        np.zeros(2),
     )
 
 
@@ -209,10 +230,19 @@ def enclose_cell(table: Table, work: Subdivision, cell: Floats, shares: Floats) 
 
 @routine
 def unproved_row(table: Table, work: Subdivision, cell: Floats) -> int:
-    """The row with the least margin of those that are not proved on a cell; -1 if all are, and noted in the cell."""
+    """The row with the least margin of those that are not proved on a cell; -1 if all are, and noted in the cell.
+
+    Without bounds of implicit coordinates it is the last one, on the whole machine. What is proved on a cell with such
+    coordinates is not taken over by its halves: they may enclose others.
+    """
     rows, measures, n = work.rows, work.measures, work.parameters.kinds[2]
     margin = max(measures[FOUND_MARGIN] - measures[GAP], 0.0) if measures[GAP] < math.inf else 0.0
-    put_cell(work.parameters, cell, rows.cell)
+    if not put_pose(table, work.sides, work.parameters, cell, rows, work.implicit):
+        cell[PROVED_LEGS] = 0.0
+        put_unknown_machine(work, cell)
+        return rows.rows.shape[0] - 1
+    if has_implicit(work.parameters):
+        cell[PROVED_LEGS] = 0.0
     proved, worst, least_margin, proved_margin = int(cell[PROVED_LEGS]), -1, math.inf, measures[PROVED_MARGIN]
     is_round = work.parameters.kinds[0] == TILT or work.parameters.kinds[1] != BOX
     n_legs, n_leg_rows, has_ends = table.legs.shape[0], first_link_row(table), False
@@ -249,14 +279,36 @@ def unproved_row(table: Table, work: Subdivision, cell: Floats) -> int:
                 proved |= bit
     cell[PROVED_LEGS] = float(proved)
     measures[PROVED_MARGIN] = proved_margin
+    if worst < 0 and work.parameters.kinds[4] == 1:
+        work.parallel.side[0] = 0.0
+        is_filled = put_parallel(table, work.sides, n, rows, work.parallel)
+        if not is_filled or not is_regular(work.parameters, n, work.parallel):
+            put_unknown_machine(work, cell)
+            return rows.rows.shape[0] - 1
     return worst
 
 
 @routine
+def put_unknown_machine(work: Subdivision, cell: Floats) -> None:
+    """The last row, which is not known, and how far each parameter moves the platform."""
+    rows = work.rows
+    last = rows.rows.shape[0] - 1
+    put_unknown(rows.rows[last], -math.inf, math.inf)
+    put_cell(work.parameters, cell, rows.cell)
+    for i in range(N_PARAMETERS):
+        motion = rows.cell.motions[i]
+        rows.spreads[rows.owners[last], i] = norm(vec(motion)) + norm(vec(motion[3:]))
+
+
+@routine
 def put_row(table: Table, work: Subdivision, box: Floats, row: int) -> int:
-    """Fill the rows of the leg, or the pair of links, of a row over a box; the row, of a pair the lowest one."""
+    """Fill the rows of the leg, or the pair of links, of a row over a box; the row, of a pair the lowest one.
+
+    It is -1 where implicit coordinates are not known.
+    """
     rows, n, owner, n_legs = work.rows, work.parameters.kinds[2], work.rows.owners[row], table.legs.shape[0]
-    put_cell(work.parameters, box, rows.cell)
+    if not put_pose(table, work.sides, work.parameters, box, rows, work.implicit):
+        return -1
     if owner < n_legs:
         put_limits(table, work.sides, work.parameters.uncertain[0], owner, n, rows)
         return row
@@ -349,8 +401,15 @@ def prove(machine: int, subdivision: int) -> int:
         is_broken = False
         for i in range(N_PARAMETERS):
             work.cells[2, i] = work.rows.spreads[work.rows.owners[row], i]
-        if work.measures[GAP] < math.inf or centre_less_slopes(work.rows.rows[row], work.parameters.kinds[2]) < 0.0:
+        is_limit = row + 1 < work.rows.rows.shape[0]
+        if is_limit and (
+            work.measures[GAP] < math.inf or centre_less_slopes(work.rows.rows[row], work.parameters.kinds[2]) < 0.0
+        ):
             is_broken = breaks_limit(table, work, row, cell, corner)
+        elif not is_limit and work.parallel.side[0] < 0.0:
+            for i in range(N_PARAMETERS):
+                work.pose[i] = cell[i]
+            work.counters[LIMIT], work.parallel.side[0], is_broken = row, 0.0, True
         if is_small(cell) or counters[N_STACK] + 2 > stack.shape[0]:
             copy_row(cell, work.left[counters[N_OPEN]])
             counters[N_OPEN] += 1
@@ -415,8 +474,8 @@ def value_at(table: Table, work: Subdivision, row: int, point: Floats) -> float:
     """The value of a row at one pose, of a pair of links that of their distance; the point's half sizes become zero."""
     for i in range(N_PARAMETERS):
         point[HALF + i] = 0.0
-    value: float = work.rows.rows[put_row(table, work, point, row), CENTRE]
-    return value
+    filled = put_row(table, work, point, row)
+    return work.rows.rows[filled, CENTRE] if filled >= 0 else math.inf
 
 
 @routine
@@ -426,7 +485,11 @@ def descend(table: Table, work: Subdivision, row: int, cell: Floats, value: floa
     for _ in range(DESCENT_STEPS):
         for i in range(N_PARAMETERS):
             point[i], point[HALF + i] = work.pose[i], size * cell[HALF + i]
-        put_corner(work, point, put_row(table, work, point, row), point)
+        filled = put_row(table, work, point, row)
+        if filled < 0:
+            size *= 0.5
+            continue
+        put_corner(work, point, filled, point)
         tried = value_at(table, work, row, point)
         if tried < value:
             for i in range(N_PARAMETERS):
