@@ -26,6 +26,9 @@ WIDTH, ROW, AROUND = 8.0, 0.95, 2.9
 MOST_ROWS = 8
 """Actuators one below the other; further ones make another column."""
 
+MANY = 5000
+"""Points of a cloud beyond which an SVG or PDF has them as pixels."""
+
 LEAST = (5.0, 4.0)
 """The least width and height of a figure that has room for all of it [inches]."""
 
@@ -93,7 +96,9 @@ def _draw_forces(
     over_time.axhline(rms, color=look.asked, linewidth=0.9, linestyle="--", zorder=1)
     is_beyond = is_held | (np.abs(rates) >= fastest * (1.0 - HELD_BY))
     for mask, colour in ((~is_beyond, look.achieved), (is_beyond, HELD)):
-        over_rates.scatter(rates[mask], exerted[mask], s=3.0, color=colour, linewidths=0.0)
+        over_rates.scatter(
+            rates[mask], exerted[mask], s=3.0, color=colour, linewidths=0.0, rasterized=len(exerted) > MANY
+        )
     peak = int(np.nanargmin(np.append(np.abs(exerted - highest), np.inf)))
     for axes, where in ((over_time, times), (over_rates, rates)):
         dress(axes, look)
