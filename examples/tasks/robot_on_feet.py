@@ -86,3 +86,6 @@ for name, column in zip(dog.actuator_names[:3], path.actuators.T[:3], strict=Tru
 axes[1].set(xlabel="time [s]", ylabel="deg")
 axes[1].legend(frameon=False)
 figure.savefig("robot_on_feet.png", dpi=120)
+
+# And in motion:
+pf.animate(path, "swinging.gif", seconds=1.5, size=(3.2, 2.4), dpi=80)

@@ -68,3 +68,6 @@ for row, axis in enumerate("xyz"):
 axes[1].set(xlabel="time [s]", ylabel="mm", title="the box; dotted: asked for")
 axes[1].legend(frameon=False)
 figure.savefig("two_arms.png", dpi=120)
+
+# And in motion:
+pf.animate(driven, "held.gif", seconds=1.5, size=(3.2, 2.4), dpi=80)
