@@ -257,6 +257,79 @@ def test_wrong_feet_are_named() -> None:
             pf.stand(dog(), feet, **options)
 
 
+def weights(machine: pf.Mechanism) -> Any:
+    """The masses of a machine as loads."""
+    return {each.body: (each.mass, each.centre) for each in machine.masses}
+
+
+def most_to_spare(points: Any, centre: Any, weight: float, friction: float) -> float:
+    """The largest least f_n - |f_t| / mu of feet that carry a weight, by linear programming over pyramids."""
+    optimize = pytest.importorskip("scipy.optimize")
+    count = len(points)
+    balance = np.zeros((6, 3 * count + 1))
+    for foot, (x, y, z) in enumerate(points):
+        balance[:3, 3 * foot : 3 * foot + 3] = np.eye(3)
+        balance[3:, 3 * foot : 3 * foot + 3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+    carried = [0.0, 0.0, weight, *np.cross(centre, [0.0, 0.0, weight])]
+    rows = []
+    for foot in range(count):
+        for angle in np.arange(64) * np.pi / 32:
+            row = np.zeros(3 * count + 1)
+            row[3 * foot : 3 * foot + 3] = np.cos(angle) / friction, np.sin(angle) / friction, -1.0
+            row[-1] = 1.0
+            rows.append(row)
+    cost = np.append(np.zeros(3 * count), -1.0)
+    found = optimize.linprog(cost, rows, np.zeros(len(rows)), balance, carried, [(None, None)] * (3 * count + 1))
+    return float(-found.fun)
+
+
+def test_feet_have_to_spare_what_no_other_forces_beat() -> None:
+    """Forces on the feet carry the dog, its motors exert what MuJoCo says, and no others leave the worst foot more."""
+    machine, model = pf.stand(dog(), list(LEGS)), mujoco.MjModel.from_xml_string(dog())
+    answers = pf.solve_ik(machine, near_home(machine, 8, 0.2))
+    held = pf.forces(answers, loads=weights(machine), friction=0.6)
+    assert np.all(held.reason == "")
+    weight = 9.81 * sum(each.mass for each in machine.masses)
+    on_feet = np.stack([held.reactions[name][:, :3] for name in held.spare], axis=1)
+    np.testing.assert_allclose(on_feet.sum(axis=1), [[0.0, 0.0, weight]] * 8, atol=1e-9 * weight)
+    for row, state in enumerate(states(answers, model)):
+        mujoco.mj_forward(model, state)
+        exerted = state.qfrc_bias.copy()
+        for foot, force in zip(LEGS, on_feet[row], strict=True):
+            geom = state.geom(foot)
+            mujoco.mj_applyFT(model, state, -force, np.zeros(3), geom.xpos, model.geom_bodyid[geom.id], exerted)
+        np.testing.assert_allclose(exerted[:6], 0.0, atol=1e-8 * weight)
+        np.testing.assert_allclose(exerted[6:], held.actuators[row], atol=1e-8 * weight)
+        points = [state.geom(foot).xpos for foot in LEGS]
+        most = most_to_spare(points, state.subtree_com[1], weight, 0.6)
+        least = min(spare[row] for spare in held.spare.values())
+        assert least == pytest.approx(most, abs=2e-3 * weight)
+        assert least <= most + 1e-6 * weight
+
+
+def test_what_feet_cannot_hold_is_told() -> None:
+    """A dog pushed over, or on ice, has a reason that names the foot; limits of motors are kept."""
+    machine = pf.stand(dog(), list(LEGS))
+    home = pf.solve_ik(machine, machine.home_pose)
+    loads = weights(machine)
+    over = pf.forces(home, [0.0, 80.0, 0.0], loads=loads, friction=0.6)
+    assert "would be the first" in str(over.reason)
+    assert np.isnan(over.actuators).all()
+    assert pf.forces(home, [0.0, 20.0, 0.0], loads=loads, friction=0.6).reason == ""
+    assert "would be the first" in str(pf.forces(home, [0.0, 20.0, 0.0], loads=loads, friction=0.05).reason)
+    free = pf.forces(home, loads=loads, friction=0.6)
+    most = 0.95 * float(np.abs(free.actuators).max())
+    kept = pf.forces(home, loads=loads, friction=0.6, limits=most)
+    assert kept.reason == ""
+    assert np.abs(kept.actuators).max() <= most * (1.0 + 1e-9)
+    assert min(kept.spare.values()) <= min(free.spare.values()) + 1e-6
+    for wrong, text in ((0.0, "positive"), ({"nix": 0.5}, "nix")):
+        with pytest.raises(PfabrikError, match=text):
+            pf.forces(home, loads=loads, friction=wrong)  # type: ignore[arg-type]
+    with pytest.raises(InvalidArgument, match="no passive ball"):
+        pf.forces(pf.solve_ik(pf.load("panda"), pf.load("panda").home_pose), friction=0.5)
+
+
 ELSEWHERE = pf.pose([30.0, -20.0, 10.0], rpy=[0.0, 0.0, 0.7])
 ASKEW = pf.pose([30.0, -20.0, 10.0], rotvec=[0.3, -0.5, 0.7])
 

@@ -58,6 +58,14 @@ print(leaning.status.name, dict(zip(dog.actuator_names, front_left, strict=False
 print(pf.solve_ik(dog, pf.pose([0.0, 0.0, 0.5])).reason)
 print(pf.travel(pf.solve_ik(dog, dog.home_pose)))
 
+# ## Would a foot slip?
+#
+# Twelve motors hold six freedoms in many ways. With a coefficient of friction they share the weight so that the foot
+# that is the first to slip or lift has most to spare; a push that no forces hold is told.
+weights = {each.body: (each.mass, each.centre) for each in dog.masses}
+print(pf.forces(leaning, loads=weights, friction=0.6).spare)
+print(pf.forces(leaning, [0.0, 90.0, 0.0], loads=weights, friction=0.6).reason)
+
 # ## Back to the robot
 #
 # `interop.qpos` gives MuJoCo's positions, of the trunk that floats and of all joints, in the order of the model: of one

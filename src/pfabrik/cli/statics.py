@@ -71,6 +71,7 @@ def pressing(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.command()
 @at_a_pose
 @pressing
+@click.option("--friction", type=FINITE, metavar="MU", help="Between the ground and feet that are passive balls on it.")
 @click.option("--reactions", is_flag=True, help="List what every joint transmits, and forces along rods.")
 @json_option()
 def forces(
@@ -80,6 +81,7 @@ def forces(
     loads: Loads,
     gravity: Triple,
     limits: tuple[str, ...],
+    friction: float | None,
     reactions: bool,
     as_json: bool,
 ) -> int:
@@ -90,14 +92,19 @@ def forces(
 
     With --limit it says too how large a force may come on top, in whichever direction; or, with exit code 1, which
     actuators would be beyond theirs to hold the load, and by how much.
+
+    With --friction the masses of the file weigh too, and feet neither slip nor lift: the one that is the first to is
+    named, with the normal force that it has to spare.
     """
+    if friction is not None:
+        loads = weights(solution.mechanism) | loads
     if not (force or moment or loads or limits):
         raise click.UsageError("no load: give --force, --moment or --load; or --limit, for what can be held")
     wrench = (force or (0.0, 0.0, 0.0)) + (moment or ())
     bounds = by_name("--limit", limits, "actuator", actuators(solution.mechanism), bounds_of)
-    held = pf.forces(solution, wrench, loads=loads, gravity=gravity, limits=bounds or None)
+    held = pf.forces(solution, wrench, loads=loads, gravity=gravity, limits=bounds or None, friction=friction)
     others: dict[str, Result] = {"reactions": held.reactions} if reactions else {}
-    if bounds and not held.reason:
+    if bounds and friction is None and not held.reason:
         used = pf.forces(solution, wrench, loads=loads, gravity=gravity).actuators.tolist()
         left: dict[str, tuple[float, float]] = {}
         for name, force_used in zip(solution.mechanism.actuator_names, used, strict=True):
@@ -106,6 +113,15 @@ def forces(
         others["capacity"] = pf.wrench_capacity(solution, left)
     print_result(as_json, held, others)
     return int(bool(held.reason))
+
+
+def weights(mechanism: pf.Mechanism) -> Loads:
+    """The masses of a machine's bodies as loads."""
+    from ..machine.description.body_inertias import inertias_of
+    from ..machine.files.units import metres_of
+
+    own = inertias_of(mechanism, metres_of(mechanism.length_unit))
+    return {body: (each.mass, each.centre.tolist()) for body, each in own.items()}
 
 
 def bounds_of(words: str) -> float | tuple[float, float]:

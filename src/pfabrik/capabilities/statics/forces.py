@@ -18,6 +18,7 @@ from ...common.printed import Printed, ResultTable, plain
 from ...kinematics import JointRates, actuator_units, end_effector_pose, joint_centres, model_of
 from ...machine.description.mechanism import Mechanism
 from ...tolerances import TOLERANCES
+from .footing import Feet, best_footing, cone_rows, feet_of, off_the_ends, spare_of
 from .geometric_stiffness import geometric_stiffness
 from .joint_balance import (
     COMPONENTS,
@@ -53,6 +54,7 @@ from .sharing import within_limits
 from .transmission import GAINS_MOTION, NO_CONFIGURATION, gives_way_in_words, is_redundantly_actuated, maps_of
 
 GRAVITY = (0.0, 0.0, -9.81)
+OFF_FEET = "no forces of the actuators keep every contact from slipping and lifting: {} would be the first"
 BEYOND = "actuators within their limits do not hold the load: {}"
 FREE_PART = "the loads move a part that neither the end effector nor an actuator holds"
 
@@ -65,6 +67,7 @@ class _Question(NamedTuple):
     loads: list[Load]
     gravity: Floats
     limits: Floats | None
+    feet: Feet | None
 
 
 class Reactions(Printed, FrozenMapping[str, Floats]):
@@ -119,6 +122,8 @@ class Forces(Printed):
         True if there are more actuators than motions that they control: of all forces that hold the load, those with
         the least sum of squares are given, torques compared with forces times L; with `limits`, those nearest to the
         middle of these.
+    spare : mapping of str to float or array (...)
+        With `friction`, contact -> the normal force that it may lose before it slips or lifts.
     margin : float or array (...)
         With `limits`, how far the actuator that is nearest to one of its own is from it, in the unit of that; infinite
         without.
@@ -147,6 +152,11 @@ class Forces(Printed):
         if self._question.limits is not None:
             place = int(np.nanargmin(np.ravel(self.margin)))
             remarks = [f"least margin: {np.ravel(self.margin)[place]:.6g} of {np.ravel(self.binding)[place]}"]
+        if self.spare:
+            name, least = min(
+                ((n, float(np.nanmin(value))) for n, value in self.spare.items()), key=lambda each: each[1]
+            )
+            remarks.append(f"{name} is the first to slip or lift: it has {least:.5g} of normal force to spare")
         header = ("actuator", "exerts" if np.ndim(self.actuators) == 1 else "of largest magnitude", "unit")
         return ResultTable(
             mechanism.name, lines, header, list(zip(mechanism.actuator_names, values, units, strict=True)), remarks
@@ -176,6 +186,16 @@ class Forces(Printed):
         scaled = (room * actuator_units(self._mechanism)[:, None]).reshape(len(exerted), -1)
         places = np.argmin(np.where(np.isnan(scaled), np.inf, scaled), axis=1)
         return room.reshape(len(exerted), -1)[np.arange(len(exerted)), places], places
+
+    @cached_property
+    def spare(self) -> Mapping[str, float | Floats]:
+        """Contact -> the normal force that it may lose before it slips or lifts, (...); empty without `friction`."""
+        feet = self._question.feet
+        if feet is None:
+            return FrozenMapping({})
+        pressing = feet.signs[:, None] * self._transmitted[:, feet.places, :3]
+        left = spare_of(np.einsum("fij,nfj->nfi", cone_rows(feet), pressing))
+        return FrozenMapping({name: self._shaped(left[:, place]) for place, name in enumerate(feet.names)})
 
     @cached_property
     def reactions(self) -> Reactions:
@@ -246,7 +266,7 @@ class Forces(Printed):
 
     def _geometric_stiffness(self) -> tuple[Pairs, Floats]:
         """Motions, and the stiffness by these of the forces as the geometry changes, (n, d, d)."""
-        mechanism, q, (_, asked, loads, gravity, _) = self._mechanism, self._coordinates, self._question
+        mechanism, q, (_, asked, loads, gravity, *_) = self._mechanism, self._coordinates, self._question
         centres, reference = self._places
         arms = (centres - reference[:, None]) / mechanism.characteristic_length
         found = []
@@ -283,6 +303,7 @@ def forces(
     loads: BodyLoads | None = None,
     gravity: ArrayLike = GRAVITY,
     limits: Bounds | None = None,
+    friction: float | Mapping[str, float] | None = None,
 ) -> Forces:
     """Forces that the actuators exert to hold a load, and what the joints transmit, in static equilibrium.
 
@@ -308,6 +329,11 @@ def forces(
         What actuators exert at most, both ways, or (lowest, highest), for all, each, or by name: (-200, -5) of cables
         that stay taut. Redundant actuators then share a load within these, as near to their middle as it lets them; a
         load that none of these forces hold has a reason.
+    friction : float or mapping of str to float, optional
+        Coefficient of friction between the ground and all point contacts, which are the passive balls on the base, or
+        by the names of these joints; the ground's normal is against gravity. Actuators then share the load so that
+        the contact that is nearest to slipping or lifting has most to spare. A load that no forces hold without has a
+        reason.
 
     Raises
     ------
@@ -321,13 +347,14 @@ def forces(
         checked_loads(mechanism, loads),
         checked_gravity(gravity),
         None if limits is None else bounds_of("limits", limits, mechanism.actuator_names),
+        None if friction is None else feet_of(mechanism, friction, checked_gravity(gravity)),
     )
     asked, maps = question.asked, maps_of(solution)
     places = asked.places
     reasons = no_reasons(len(places))
     add_reason(reasons, ~maps.is_valid[places], NO_CONFIGURATION)
     actuators = np.full((len(places), len(mechanism.actuator_names)), np.nan)
-    is_quick = maps.is_regular[places] & (not question.loads) & (limits is None)
+    is_quick = maps.is_regular[places] & (not question.loads) & (limits is None) & (friction is None)
     forward = maps.forward[places[is_quick]]
     actuators[is_quick] = -np.einsum("nra,nr->na", forward, asked.wrenches[is_quick, : forward.shape[1]])
     rest = np.flatnonzero(maps.is_valid[places] & ~is_quick)
@@ -340,12 +367,18 @@ def forces(
         add_reason(reasons, rest[~found.is_held[:, 0]], gives_way_in_words(mechanism))
         if question.limits is not None:
             units = actuator_units(mechanism)
+            limits = question.limits if question.feet is None else off_the_ends(question.limits)
             shared, beyond, is_within = within_limits(
-                found.actuators[..., 0], pairs_of(mechanism, q).rates, question.limits * units[:, None]
+                found.actuators[..., 0], pairs_of(mechanism, q).rates, limits * units[:, None]
             )
             actuators[rest] = shared / units
             for row in np.flatnonzero(~is_within):
                 add_reason(reasons, [rest[row]], _beyond_in_words(mechanism, question.limits, beyond[row] / units))
+        if question.feet is not None:
+            rest = rest[~has_reason(reasons[rest])]
+            actuators[rest], least, worst = _on_feet(question, actuators[rest], rest)
+            for row in np.flatnonzero(least < 0.0):
+                add_reason(reasons, [rest[row]], OFF_FEET.format(question.feet.names[worst[row]]))
         actuators[has_reason(reasons)] = np.nan
     return Forces(
         shaped(actuators, asked.shape),
@@ -353,6 +386,41 @@ def forces(
         in_shape(reasons, asked.shape),
         question,
     )
+
+
+def _on_feet(question: _Question, exerted: Floats, rows: NDArray[np.intp]) -> tuple[Floats, Floats, Ints]:
+    """Forces of the actuators (n, n_a) that keep feet on the ground best, the least that one has to spare, and which.
+
+    Parameters
+    ----------
+    exerted : some that hold the load, within the limits.
+    rows : of the question.
+    """
+    mechanism, feet = question.solution.mechanism, question.feet
+    assert feet is not None
+    units, spares, chosen = actuator_units(mechanism), np.empty((len(rows), len(feet.names))), exerted.copy()
+    limits = np.full((len(units), 2), np.inf) * (-1.0, 1.0) if question.limits is None else question.limits
+    for place, row in enumerate(rows):
+        q = question.solution._configurations.coordinates_at(question.asked.places[[row]])
+        centres, reference = joint_centres(mechanism, q), end_effector_pose(mechanism, q)[:, :3, 3]
+
+        def on_feet(wrenches: Floats, centres: Floats = centres, reference: Floats = reference) -> Floats:
+            """Forces (f, 3, k) on the feet from the ground."""
+            found = about_centres(mechanism, wrenches, centres, reference)[0, feet.places, :3]
+            return np.asarray(feet.signs[:, None, None] * found)
+
+        left, sizes, _ = np.linalg.svd(pairs_of(mechanism, q).rates[0])
+        free = left[:, int((sizes > TOLERANCES.singular * sizes[:1]).sum()) :]
+        own = np.zeros((1, len(mechanism.joints), 6, free.shape[1]))
+        changes = on_feet(balance(mechanism, q, own, free[None]).wrenches)
+        more = exerted[place] * units - _balanced(question, q, rows[[place]]).actuators[0, :, 0]
+        pressing = on_feet(_balanced(question, q, rows[[place]], more[None, :, None]).wrenches)[..., 0]
+        along_free = best_footing(pressing, changes, feet, exerted[place] * units, free, limits * units[:, None])
+        chosen[place] += free @ along_free / units
+        spares[place] = spare_of(np.einsum("fij,fj->fi", cone_rows(feet), pressing + changes @ along_free))
+    least = spares.min(axis=1, initial=np.inf)
+    sizes = TOLERANCES.speed * np.abs(spares).max(axis=1, initial=0.0)
+    return chosen, np.where(np.abs(least) <= sizes, 0.0, least), spares.argmin(axis=1)
 
 
 def _beyond_in_words(mechanism: Mechanism, limits: Floats, beyond: Floats) -> str:

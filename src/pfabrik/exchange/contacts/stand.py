@@ -36,7 +36,7 @@ def stand(
     """A robot on its feet: an ordinary mechanism, whose end effector is the trunk and whose base is the ground.
 
     What held the trunk, or let it float, goes; joints keep their names and the signs of their coordinates. Contacts
-    hold both ways: a foot neither slides nor lifts, whatever the load. `interop.from_mjcf` and `from_urdf` do the same
+    hold both ways: a foot neither slides nor lifts, whatever the load (`forces` with `friction` tells). `interop.from_mjcf` and `from_urdf` do the same
     (`feet=`), and tell what was left out or changed.
 
     Parameters
