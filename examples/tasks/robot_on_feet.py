@@ -63,7 +63,8 @@ print(pf.travel(pf.solve_ik(dog, dog.home_pose)))
 # Twelve motors hold six freedoms in many ways. With a coefficient of friction they share the weight so that the foot
 # that is the first to slip or lift has most to spare; a push that no forces hold is told.
 weights = {each.body: (each.mass, each.centre) for each in dog.masses}
-print(pf.forces(leaning, loads=weights, friction=0.6).spare)
+spare = pf.forces(leaning, loads=weights, friction=0.6).spare
+print({name: round(float(value), 2) for name, value in spare.items()}, "N to spare")
 print(pf.forces(leaning, [0.0, 90.0, 0.0], loads=weights, friction=0.6).reason)
 
 # ## Back to the robot
