@@ -22,6 +22,7 @@ from ..statics.joint_balance import open_in_words
 from ..statics.loads import Reasons, reasons_in_words
 from .drives import Drives, drives_of
 from .moving_rows import MovingRows
+from .path_notes import path_notes
 from .transmitted import transmitted
 
 if TYPE_CHECKING:
@@ -125,7 +126,7 @@ class Efforts(Printed):
             rows.append(cells)
         if np.isfinite(limits).any():
             header.append("of its limit")
-        remarks = self._resting
+        remarks = [*self._resting, *path_notes(self._rows, exerted)]
         if self.energy is not None and self.times is not None and np.isfinite(self.energy[-1]):
             remarks.append(f"given in all: {self.energy[-1]:.6g} J in {np.ptp(self.times):.6g} s")
         return ResultTable(self._mechanism.name, lines, header, rows, remarks)
