@@ -473,3 +473,10 @@ def test_errors_are_one_sentence(changed: dict[str, Any], says: str) -> None:
     with pytest.raises((pf.errors.InvalidArgument, pf.errors.UnknownName)) as raised:
         pf.design(**(asked | changed))
     assert says in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_a_region_of_one_pose_is_proved() -> None:
+    """With a margin that is asked for: what is found in the only cell proves it."""
+    one = PoseRegion.box([5, 0, 10], [5, 0, 10])
+    design = pf.design(pf.load(TEMPLATES / "6-UPS.toml"), **{**HEXAPOD, "reach": one})
+    assert design.verdict == "PROVED"
