@@ -365,3 +365,11 @@ def test_every_file_that_is_written_is_named() -> None:
         result = pfabrik(line)
         assert result.exit_code == 0, result.output
         assert [row.split()[1].rstrip(";") for row in result.stderr.splitlines() if row.startswith("wrote ")] == files
+
+
+def test_columns_of_joints_leave_nothing_of_the_task_out(tmp_path: Path) -> None:
+    """Their poses turn as the joints do, which the task of a Tricept does not set."""
+    path = tmp_path / "joints.csv"
+    path.write_text("t,D[0],D[1],E\n0,0,0,270\n1,5,2,280\n")
+    result = pfabrik(f"track tricept {path}")
+    assert result.exit_code == 0 and "no effect" not in result.stderr

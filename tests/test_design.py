@@ -514,3 +514,10 @@ def test_a_picture_has_the_machine_before_and_after_around_what_is_to_be_reached
     pyplot.close(figure)
     with pytest.raises(pf.errors.InvalidArgument, match="theme"):
         found.plot(theme="none")  # type: ignore[arg-type]
+
+
+def test_a_region_of_one_pose_is_proved() -> None:
+    """With a margin that is asked for: what is found in the only cell proves it."""
+    one = PoseRegion.box([5, 0, 10], [5, 0, 10])
+    design = pf.design(pf.load(TEMPLATES / "6-UPS.toml"), **{**HEXAPOD, "reach": one})
+    assert design.verdict == "PROVED"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -666,3 +667,34 @@ def test_a_picture_of_efforts_has_every_actuator_between_its_limits(name: str) -
     pyplot.close(figure)
     with pytest.raises(pf.errors.InvalidArgument, match="size"):
         found.plot(size=(1.0, 1.0))
+
+
+def notes(efforts: pf.Efforts) -> str:
+    return " ".join(str(efforts).split())
+
+
+def test_what_the_digits_of_a_path_make_is_said_about_as_large_as_it_is() -> None:
+    """Twice the root mean square of what rounding changes, within a factor of two; nothing where it does not show."""
+    machine = weighed(pf.load("linear_delta"))
+    for step, digits, is_said in ((5e-4, 3, True), (1e-3, 3, True), (0.02, 3, False), (1e-3, 9, False)):
+        t = np.arange(0.0, 1.0, step)
+        exact = machine.home_pose[:3, 3] + np.stack([10 * np.sin(3 * t) ** 3, 8 * np.sin(2 * t) ** 4, 0 * t], axis=1)
+        rounded, smooth = (
+            pf.inverse_dynamics(pf.track(machine, each, sample_time=step)) for each in (exact.round(digits), exact)
+        )
+        said = re.search(r"digits of this path make ±(\S+) N of that", notes(rounded))
+        assert bool(said) == is_said and "digits" not in notes(smooth)
+        if said is not None:
+            off = 2.0 * np.sqrt(np.mean((rounded.actuators - smooth.actuators)[3:-3] ** 2, axis=0)).max()
+            assert 0.5 * off < float(said[1]) < 2.0 * off
+    whole = machine.home_pose[:3, 3] + np.arange(50)[:, None] * np.array([0.1, 0.0, 0.0])
+    assert "digits" not in notes(pf.inverse_dynamics(pf.track(machine, whole, sample_time=0.1)))  # exact, not rounded
+
+
+def test_a_path_that_is_in_motion_at_its_ends_says_so() -> None:
+    machine = weighed(pf.load("linear_delta"))
+    few = machine.home_pose[:3, 3] + np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [5.0, 0.0, 0.0], [12.0, 0.0, 0.0]])
+    assert "starts at" in notes(pf.inverse_dynamics(pf.track(machine, few, times=[0.0, 0.1, 0.2, 0.3])))
+    t = np.linspace(0.0, 1.0, 200)
+    gentle = machine.home_pose[:3, 3] + (t**3 * (10.0 - 15.0 * t + 6.0 * t**2))[:, None] * np.array([10.0, 0.0, 5.0])
+    assert "starts" not in notes(pf.inverse_dynamics(pf.track(machine, gentle, times=t)))

@@ -346,3 +346,11 @@ def test_the_command_reads_efforts_beside_a_path_and_writes_the_machine(tmp_path
     (tmp_path / "data.csv").write_text("\n".join([header, *map(",".join, late)]) + "\n")
     result = pfabrik([*words, "--columns", "t=time,effort_A1=tau1"])
     assert result.exit_code == 1 and "from row to row" in result.stdout + result.stderr
+
+
+@pytest.mark.filterwarnings("error")
+def test_efforts_of_zero_are_doubted_without_a_warning() -> None:
+    machine = weighed(pf.load("stewart"))
+    motion = pf.solve_ik(machine, pf.pose(machine.home_pose[:3, 3] + [[0, 0, 2.0], [5, 0, 0], [0, 5, 5.0], [3, 3, 0]]))
+    result = pf.identify(motion, np.zeros((4, 6)))
+    assert "no possible bodies explain these efforts" in str(result)

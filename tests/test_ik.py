@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import weakref
 
 import numpy as np
@@ -253,3 +254,14 @@ def test_rotations_are_accepted_up_to_the_stated_deviation() -> None:
     target[:3, :3] *= 1 + 0.2e-6
     with pytest.raises(InvalidArgument):
         pf.solve_ik(machine, target)
+
+
+def test_an_answer_of_the_same_machine_with_other_motors_or_masses_is_a_start() -> None:
+    machine = pf.load("stewart")
+    joints = [dataclasses.replace(j, friction=(1.0, 0.1)) if j.actuated else j for j in machine.joints]
+    other = dataclasses.replace(machine, joints=tuple(joints), masses=(pf.Mass("platform", 2.0, (0.0, 0.0, 200.0)),))
+    start = pf.solve_ik(machine, machine.home_pose)
+    assert pf.solve_ik(other, machine.home_pose, start=start)
+    assert pf.track(other, machine.home_pose[None], start=start)
+    with pytest.raises(InvalidArgument, match="another mechanism of the same name"):
+        pf.solve_ik(machine.with_limits({machine.actuator_names[0]: (150.0, 270.0)}), machine.home_pose, start=start)

@@ -6,6 +6,7 @@ import copy
 import math
 import pickle
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -304,9 +305,11 @@ def test_refusals_say_what_is_wrong(given: dict[str, object], error: str) -> Non
 
 def test_ticks_refuse_other_shapes_and_times() -> None:
     live = live_of(machine("stewart"), 20)
-    for dt in (0.0, -1.0, math.nan, math.inf):
-        with pytest.raises(InvalidArgument, match="dt"):
+    odd: Any = ["a", None, True, [0.1]]
+    for dt in (0.0, -1.0, math.nan, math.inf, *odd):
+        with pytest.raises(InvalidArgument, match="dt: found"):
             live.tick(live.pose, dt)
+    assert live.tick(live.pose, np.float32(0.5)) is Status.REACHED
     with pytest.raises(InvalidArgument, match="target"):
         live.tick(np.zeros((2, 3)), 1.0)
     assert live.tick([0.0, 0.0, live.pose[2, 3]], 1.0) is Status.REACHED

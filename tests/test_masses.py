@@ -385,3 +385,22 @@ def test_what_hangs_on_a_machine_by_joints_that_are_left_out_weighs_on_it(seed: 
     efforts = pf.inverse_dynamics(solution, at="actuators", **motion).actuators
     np.testing.assert_allclose(efforts, forces, atol=1e-9 * np.abs(forces).max())
     np.testing.assert_allclose(pf.mass_matrix(solution, "actuators"), mass, atol=1e-9 * np.abs(mass).max())
+
+
+def test_a_planar_body_may_have_its_one_moment_alone() -> None:
+    """As drawings of planar machines have it; then it is a lamina, which exerts the same."""
+    machine = pf.load("rrr")
+    centre = np.asarray(machine.reference_point)
+
+    def with_inertia(inertia: Any) -> pf.Mechanism:
+        return machine.with_masses([pf.Mass(body, 1.5, centre, inertia) for body in machine.bodies])
+
+    drawn, flat = with_inertia((0.0, 0.0, 80.0)), with_inertia((40.0, 40.0, 80.0))
+    moves = {"twists": [3.0, -2.0, 0.0, 0.0, 0.0, 0.7], "accelerations": [9.0, 5.0, 0.0, 0.0, 0.0, -4.0]}
+    efforts = [pf.inverse_dynamics(pf.solve_ik(each, each.home_pose), **moves).actuators for each in (drawn, flat)]
+    np.testing.assert_allclose(*efforts, rtol=1e-12)
+    with pytest.raises(pf.errors.InvalidMechanism, match="principal moments"):
+        with_inertia((0.0, 80.0, 0.0))
+    spatial = pf.load("stewart")
+    with pytest.raises(pf.errors.InvalidMechanism, match="principal moments"):
+        spatial.with_masses([pf.Mass("platform", 1.5, (0.0, 0.0, 200.0), (0.0, 0.0, 80.0))])

@@ -159,12 +159,28 @@ def test_what_cannot_be_says_so(tmp_path: Path) -> None:
         ("height\n0\n", "no column A1, A2, A3; expected one for each actuator of the machine, or x, y, z as commanded"),
         ("A1,A2,height\n0,0,0\n", "no column A3"),
         ("x,y,height\n0,,0\n", "a row without all of what was commanded"),
+        ("Start printer at Mon\nStats 1.0: a=1, b\nbye\n", "no line that a probe wrote, .* 'probe at 30,40 is z=0.12'"),
     ):
         file.write_text(text)
         with pytest.raises(InvalidArgument, match=words):
             pf.read_measurements(file, machine)
     with pytest.raises(InvalidArgument, match="No such file"):
         pf.read_measurements(tmp_path / "none.csv", machine)
+
+
+def test_a_file_given_twice_is_refused_and_the_offset_of_a_probe_is_said(tmp_path: Path) -> None:
+    """None counts twice by a slip; what no file says is taken as 0, and noted."""
+    machine, log = tmp_path / "delta.toml", tmp_path / "a.log"
+    pf.save(pf.load("linear_delta"), machine)
+    places = [(0, 0), (40, 0), (0, 40), (-40, 0), (0, -40)]
+    log.write_text("\n".join(f"probe at {x},{y} is z=0.{n}" for n, (x, y) in enumerate(places, 1)))
+    asked = ["calibrate", str(machine), str(log), "--free", "lengths"]
+    twice = CliRunner().invoke(main, [*asked[:3], str(tmp_path / "." / "a.log"), *asked[3:]])
+    assert twice.exit_code == 2 and "is given twice" in twice.stderr
+    once = CliRunner().invoke(main, asked)
+    assert "the probe is taken to be at x 0, y 0 of the nozzle, and to trigger at z 0" in once.stderr
+    sigma = CliRunner().invoke(main, [*asked, "--sigma", "-1"])
+    assert "--sigma: found -1.0; expected a positive number" in sigma.stderr
 
 
 def test_what_may_be_freed_is_listed_by_kind(tmp_path: Path) -> None:

@@ -122,8 +122,8 @@ class Live:
         InvalidArgument
             A target of another shape; a time that is not positive.
         """
-        if not 0.0 < dt < math.inf:
-            require_positive("dt", dt)
+        if type(dt) is not float or not 0.0 < dt < math.inf:
+            dt = require_positive("dt", dt)
         if type(target) is np.ndarray and target.shape == (4, 4) and target.dtype is DOUBLE and not self._has_tilt_axis:
             self._driven.target[:] = target
         else:

@@ -14,7 +14,7 @@ from ..engines.joints.close import measure_configurations
 from ..engines.joints.configurations import Configurations
 from ..errors import InvalidArgument
 from ..kernels.rows import FAILED
-from ..machine.description.mechanism import Mechanism, checked_mechanism, told_apart
+from ..machine.description.mechanism import Mechanism, checked_mechanism, moves_alike, told_apart
 from ..machine.model import model_of
 from ..machine.motion.displacements import home_coordinates
 from .solution import Solution
@@ -37,7 +37,7 @@ def start_of(mechanism: Mechanism, start: Start | None, shape: tuple[int, ...]) 
         deviations, start_shape = joint_vectors(mechanism, start, "start")
         _require_shape(start_shape, shape)
         return engine_of(mechanism).as_configurations(measure_configurations(model_of(mechanism), deviations))
-    if start.mechanism != mechanism:
+    if start.mechanism != mechanism and not moves_alike(start.mechanism, mechanism):
         found = f"an answer of {told_apart(start.mechanism, mechanism)}"
         raise InvalidArgument("start", found, f"one of '{mechanism.name}' itself, or joint coordinates")
     if np.count_nonzero(start._rows.status >= FAILED):

@@ -129,10 +129,22 @@ def _read(
     files: tuple[Path, ...], mechanism: pf.Mechanism, sigma: float | None, probe: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> pf.Measurements:
     """What all files have, as one."""
-    missing = next((file for file in files if not file.exists()), None)
-    if missing is not None:
-        raise click.ClickException(f"{missing}: no such file")
+    seen: dict[Path, Path] = {}
+    for file in files:
+        if not file.exists():
+            raise click.ClickException(f"{file}: no such file")
+        first = seen.setdefault(file.resolve(), file)
+        if first is not file:
+            same = "" if str(file) == str(first) else f", as {first}"
+            raise click.UsageError(f"DATA: {file} is given twice{same}; its rows would count twice")
     parts = [pf.read_measurements(file, mechanism, sigma=sigma, probe_offset=probe) for file in files]
+    touched = [str(file) for file, part in zip(files, parts, strict=True) if part.names[0].startswith("line ")]
+    if touched:
+        x, y, z = (f"{each:g}" for each in probe)
+        note(
+            f"{', '.join(touched)}: the probe is taken to be at x {x}, y {y} of the nozzle, and to trigger at z {z}: "
+            f"{'by the printer file' if any(probe) else 'MECH says nothing else of it'}"
+        )
     return reduce(add, parts)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -138,5 +139,5 @@ def error_text(value: float, form: str, scale: float = 1.0) -> str:
     ----------
     scale : size of what is computed, in the unit of `value`: rounding leaves a share of it.
     """
-    least = 10.0 ** math.ceil(math.log10(TOLERANCES.implied * scale) - 1e-9)
+    least = 10.0 ** math.ceil(math.log10(max(TOLERANCES.implied * scale, sys.float_info.min)) - 1e-9)
     return f"< {least:g}" if abs(value) < least else format(value, form)

@@ -352,5 +352,7 @@ def _sigmas(sigma: Any) -> dict[str, float]:
     require_known("quantity", given, QUANTITIES)
     for name, value in given.items():
         if not isinstance(value, int | float | np.floating) or not 0.0 < value < np.inf:
-            raise InvalidArgument("sigma", f"{name} {value!r}", "positive numbers")
+            if not isinstance(sigma, Mapping):
+                raise InvalidArgument("sigma", repr(value), "a positive number, or one by quantity")
+            raise InvalidArgument(f"sigma['{name}']", repr(value), "a positive number")
     return {name: float(value) for name, value in given.items()}

@@ -81,7 +81,12 @@ def read_measurements(
     if touches is not None:
         readings = _at_poses(mechanism, pose(touches.places), touches.names)
         return Measurements(readings, height=np.full(len(readings), offset[2]), sigma=sigma, names=touches.names)
-    columns = _in_units(_columns(file), mechanism)
+    try:
+        table = _columns(file)
+    except InvalidArgument as error:
+        _refuse_log(file, mechanism, error)
+        raise
+    columns = _in_units(table, mechanism)
     commanded = _commanded(columns, mechanism)
     _check_names(columns, mechanism, is_commanded=bool(commanded))
     sensors = [n for n in mechanism.coordinates_by_name if n in columns and n not in mechanism.actuator_names]
@@ -173,6 +178,20 @@ def _columns(path: Path) -> dict[str, Floats]:
         for rows in table.rows(MOST_ROWS):
             return {name: np.array(table.numbers(rows, name, gaps=True), float) for name in table.header}
         raise WrongText("no line of numbers; expected a header, then a configuration a line")
+
+
+def _refuse_log(path: Path, mechanism: Mechanism, error: InvalidArgument) -> None:
+    """Refuse a file whose first line is no header of measurements: a log, in which no probe wrote a line."""
+    with _reading(path, "a CSV file of measurements") as text:
+        first = next((line for line in lines_of(text, MOST_ROWS, "a table") if line.strip()), "")
+    names = {cell.strip().removeprefix(TARGET).removesuffix("_deg").removesuffix("_rad") for cell in first.split(",")}
+    if not names & {*mechanism.coordinates_by_name, *POSITION, *ANGLES, *QUATERNION, HEIGHT, DISTANCE}:
+        found = "no line that a probe wrote, and no column of measurements in the first line"
+        expected = (
+            "lines of a log such as 'probe at 30,40 is z=0.12' or 'Bed X: 30 Y: 40 Z: 0.12', a heightmap.csv, or a CSV "
+            "file with a column for each actuator, or x, y and height"
+        )
+        raise InvalidArgument(str(path), found, expected) from error
 
 
 def _check_names(columns: dict[str, Floats], mechanism: Mechanism, *, is_commanded: bool) -> None:

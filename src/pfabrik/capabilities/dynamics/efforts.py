@@ -24,6 +24,7 @@ from ..statics.joint_balance import open_in_words
 from ..statics.loads import Reasons, reasons_in_words
 from .drives import Drives, drives_of
 from .moving_rows import MovingRows
+from .path_notes import path_notes
 from .sizing import Sizing, seconds_of, sizing_of
 from .transmitted import transmitted
 
@@ -127,7 +128,8 @@ class Efforts(Printed):
         lines, limits = reasons_in_words(self.reason, "no forces"), self._drives.limits
         if np.isnan(self.sizing.rms).any():
             return ResultTable(self._mechanism.name, lines or ["no row"])
-        remarks = self._out_of_reach + self._resting
+        exerted = np.reshape(self.actuators, (-1, len(self._drives.forces)))
+        remarks = [*self._out_of_reach, *self._resting, *path_notes(self._rows, exerted)]
         if self.energy is not None and self.times is not None and np.isfinite(self.energy[-1]):
             given = plain(float(self.energy[-1]), 1e-6 * float(np.nanmax(np.abs(self.energy))))
             remarks.append(f"given in all: {given} J in {np.ptp(self.times):.6g} s")

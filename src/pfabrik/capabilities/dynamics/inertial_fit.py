@@ -170,5 +170,5 @@ def combined(
     back = np.linalg.inv(shown[:, leading])
     factors, deviations = back @ shown, np.linalg.norm(back * spread, axis=1)
     factors[np.abs(factors) <= np.maximum(SLIGHT * deviations[:, None], OPEN)] = 0.0
-    own = sizes[leading]
-    return leading, factors * (own[:, None] / sizes), own * deviations
+    own, by = sizes[leading], np.where(sizes > 0.0, sizes, 1.0)  # of a size of 0 there is nothing to compare
+    return leading, factors * (own[:, None] / by), own * deviations

@@ -245,7 +245,8 @@ def _path(
         targets = pose(np.array(positions).T, quat_xyzw=_quaternions(columns, lines))
     else:
         targets = pose(np.array(positions).T, rpy=np.array(turned).T)
-    return Path(targets, columns.get("t"), feeds, lines, others, (units[0], units[1], units[2]))
+    angle_units = units[0], units[1], units[2]
+    return Path(targets, columns.get("t"), feeds, lines, others, angle_units, by_joints=joints is not None)
 
 
 def _quaternions(columns: Mapping[str, Floats], lines: Sequence[int]) -> Floats:

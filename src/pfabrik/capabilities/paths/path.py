@@ -43,6 +43,8 @@ class Path(NamedTuple):
         first.
     dwells : array (n,) or None
         Time at rest before each target, which is where the one before it is [s]; None where there is none.
+    by_joints : bool
+        True if the targets follow from columns of joints, whose poses have what the task leaves out as well.
     """
 
     targets: Floats
@@ -53,6 +55,7 @@ class Path(NamedTuple):
     angle_units: tuple[AngleUnit, AngleUnit, AngleUnit]
     passed: Mapping[str, int] = MappingProxyType({})
     dwells: Floats | None = None
+    by_joints: bool = False
 
     @classmethod
     def of(cls, targets: Floats) -> Path:

@@ -393,9 +393,7 @@ def prove(machine: int, subdivision: int) -> int:
         counters[N_CELLS] += 1
         row = unproved_row(table, work, cell)
         if row < 0:
-            if counters[N_PROVED] < work.proved.shape[0]:
-                copy_row(cell, work.proved[counters[N_PROVED]])
-            counters[N_PROVED] += 1
+            keep_proved(work, cell)
             continue
         put_corner(work, cell, row, corner)
         is_broken = False
@@ -410,7 +408,9 @@ def prove(machine: int, subdivision: int) -> int:
             for i in range(N_PARAMETERS):
                 work.pose[i] = cell[i]
             work.counters[LIMIT], work.parallel.side[0], is_broken = row, 0.0, True
-        if is_small(cell) or counters[N_STACK] + 2 > stack.shape[0]:
+        if is_small(cell) and not is_broken and unproved_row(table, work, cell) < 0:  # by the margin found in it
+            keep_proved(work, cell)
+        elif is_small(cell) or counters[N_STACK] + 2 > stack.shape[0]:
             copy_row(cell, work.left[counters[N_OPEN]])
             counters[N_OPEN] += 1
             if counters[N_OPEN] >= work.left.shape[0]:
@@ -420,6 +420,14 @@ def prove(machine: int, subdivision: int) -> int:
         if is_broken:
             return BROKEN
     return DONE if counters[N_OPEN] == 0 else TOO_SMALL
+
+
+@routine
+def keep_proved(work: Subdivision, cell: Floats) -> None:
+    """Count a cell as proved, and keep it where there is room."""
+    if work.counters[N_PROVED] < work.proved.shape[0]:
+        copy_row(cell, work.proved[work.counters[N_PROVED]])
+    work.counters[N_PROVED] += 1
 
 
 @routine

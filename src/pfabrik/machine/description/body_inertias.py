@@ -10,7 +10,7 @@ import numpy as np
 
 from ...common.arrays import Floats
 from ...common.derived import derived
-from .body_masses import as_matrix
+from .body_masses import Moments, as_matrix, lamina
 from .links import links_of
 from .structure import Structure
 
@@ -52,9 +52,15 @@ def inertias_of(mechanism: Structure, metres: float) -> dict[str, BodyInertia]:
             whole = whole._replace(centre=np.array(centre))
         elif shapes:
             whole = joined([_filled(mechanism, k, 1.0) for k, _ in shapes])
-        inertia = whole.inertia * (mass / (whole.mass or 1.0)) if moments is None else as_matrix(moments)
+        inertia = whole.inertia * (mass / (whole.mass or 1.0)) if moments is None else _as_body(mechanism, moments)
         found[body] = BodyInertia(mass, whole.centre, inertia)
     return found
+
+
+def _as_body(mechanism: Structure, moments: Moments) -> Floats:
+    """Moments as a matrix; those about the only axis of a planar machine are of a lamina."""
+    flat = lamina(mechanism.joints, moments)
+    return as_matrix(moments) if flat is None else flat
 
 
 def joined(parts: Sequence[BodyInertia]) -> BodyInertia:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -9,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...common.arrays import Floats
+from ...tolerances import TOLERANCES
 from .coercion import numbers, text
 from .form_faults import is_numbers
-from .joints import Vector, set_fields
+from .joints import Joint, Vector, set_fields
 
 Moments: TypeAlias = tuple[float, float, float, float, float, float]
 
@@ -36,7 +39,8 @@ class Mass:
     inertia : tuple of float or None
         Moments of inertia about the centre, along the axes of the base at home: Ixx, Iyy, Izz, Ixy, Ixz, Iyz, the last
         three as they stand in the matrix [kg length²]. Three numbers, or a matrix (3, 3), may be given in their place.
-        By default those of the body's shapes, or, with a `centre`, 0: a point.
+        By default those of the body's shapes, or, with a `centre`, 0: a point. Where all bodies turn about one axis,
+        the moment about that may stand alone: the body is then as flat as it may be.
     """
 
     body: str
@@ -53,6 +57,27 @@ class Mass:
     def __post_init__(self) -> None:
         set_fields(self, body=text(self.body), mass=numbers(self.mass), centre=numbers(self.centre))
         set_fields(self, inertia=_six(numbers(self.inertia)))
+
+
+def lamina(joints: Iterable[Joint], moments: Any) -> Floats | None:
+    """The inertia (3, 3) of a lamina, where moments are about the only axis that all bodies turn about; else None."""
+    axes = []
+    for joint in joints:
+        if joint.type in ("revolute", "cylindrical") and joint.axis is not None and is_numbers(joint.axis, 3):
+            size = float(np.linalg.norm(joint.axis))
+            axes.append(np.array(joint.axis, float) / (size or math.nan))
+        elif joint.type not in ("prismatic", "fixed"):
+            return None
+    if not axes or not np.linalg.norm(np.cross(axes, axes[0]), axis=1).max() <= TOLERANCES.alignment:
+        return None
+    along, inertia = np.outer(axes[0], axes[0]), as_matrix(moments)
+    about = float(axes[0] @ inertia @ axes[0])
+    is_alone = about > 0.0 and np.abs(inertia - about * along).max() <= INERTIA_SLACK * about
+    return 0.5 * about * (np.eye(3) + along) if is_alone else None
+
+
+INERTIA_SLACK = 1e-6
+"""Share of the largest moment of inertia by which moments may break their rules: files have six digits."""
 
 
 def _six(given: Any) -> Any:

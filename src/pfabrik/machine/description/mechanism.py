@@ -24,7 +24,7 @@ from .expanded import expanded
 from .faults import find_faults, joint_index
 from .form_faults import shown
 from .home_mobility import end_effector_freedom, is_held, unclear_conditions, universal_axes
-from .joints import JOINT_TYPES, Cone, Joint, JointType, Range, Vector, set_fields
+from .joints import DRIVE_FIELDS, JOINT_TYPES, Cone, Joint, JointType, Range, Vector, set_fields
 from .leg_joints import legs_name
 from .legs import Leg, as_legs
 from .mechanism_table import mechanism_table
@@ -448,6 +448,19 @@ class Mechanism(Structure):
 def checked_mechanism(mechanism: Any) -> Mechanism:
     """The argument, if it is a Mechanism; raises InvalidArgument otherwise."""
     return require_type("mechanism", mechanism, Mechanism, "a Mechanism, as `load` returns")
+
+
+def moves_alike(other: Mechanism, mechanism: Mechanism) -> bool:
+    """True where mechanisms differ in nothing but their motors and what their bodies weigh."""
+    nothing: dict[str, Any] = dict.fromkeys(DRIVE_FIELDS)
+
+    def moving(each: Mechanism) -> list[Any]:
+        joints = [dataclasses.replace(joint, **nothing) for joint in each.joints]
+        shapes = [dataclasses.replace(shape, density=None) for shape in each.shapes]
+        others = {field.name for field in dataclasses.fields(Structure) if field.compare}
+        return [joints, shapes, *(getattr(each, name) for name in sorted(others - {"joints", "shapes", "masses"}))]
+
+    return moving(other) == moving(mechanism)
 
 
 def told_apart(other: Mechanism, mechanism: Mechanism) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from string import digits
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import Fault, near_miss
 from ...tolerances import TOLERANCES
 from ..meshes import UnusableMesh, hull_of
-from .body_masses import Mass, as_matrix
+from .body_masses import INERTIA_SLACK, Mass, as_matrix, lamina
 from .body_shapes import SHAPE_FIELDS, SHAPE_KINDS, Shape
 from .enclosing import enclosing_radius
 from .form_faults import (
@@ -151,17 +151,19 @@ def mass_faults(mechanism: Structure) -> Iterator[Fault]:
         yield from faults_by(OF_MASSES, f"mass[{index}]", each, mechanism, bodies[:index])
 
 
-def is_impossible(moments: Any) -> str | bool:
-    """What is wrong with moments of inertia that no body can have, if anything is."""
+def is_impossible(moments: Any, joints: Iterable[Joint] = ()) -> str | bool:
+    """What is wrong with moments of inertia that no body can have, if anything is.
+
+    Between `joints` that let bodies turn about one axis alone, the moment about that suffices.
+    """
     if not is_numbers(moments, 6) or not all(map(math.isfinite, moments)):
         return True
+    if lamina(joints, moments) is not None:
+        return False
     least, middle, most = np.linalg.eigvalsh(as_matrix(moments)).tolist()
     principal = f"principal moments {least:.6g}, {middle:.6g} and {most:.6g}"
     return principal if least < -INERTIA_SLACK * most or most > (1.0 + INERTIA_SLACK) * (least + middle) else False
 
-
-INERTIA_SLACK = 1e-6
-"""Share of the largest moment of inertia by which moments may break their rules: files have six digits."""
 
 OF_MASSES = (
     wrong("body", lambda v, each, m, before: v not in m.bodies and f"{shown(v)}: no such body"
@@ -174,7 +176,7 @@ OF_MASSES = (
     wrong("centre", lambda v, each, m, before: v is None and each.mass != 0.0
           and not any(s.body == each.body and s.is_filled for s in m.shapes),
           "three numbers, the centre of mass: the body has no shape to take it from"),
-    wrong("inertia?", lambda v, *_: is_impossible(v),
+    wrong("inertia?", lambda v, each, m, before: is_impossible(v, m.joints),
           "Ixx, Iyy, Izz and, if not 0, Ixy, Ixz, Iyz of a body: its principal moments are not negative, "
           "and none is more than the other two together"),
 )  # fmt: skip
