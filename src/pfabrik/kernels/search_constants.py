@@ -21,6 +21,9 @@ SHORTEST_SHARE = 1.0 / 8192.0
 """Shortest step of a continuation, as a share of the way: where even that does not contract, a parallel singularity, or
 a limit, ends the assembly mode."""
 
+UNBOUNDED = 2**31 - 1
+"""More steps than are ever taken; an integer of a controller has 32 bits."""
+
 MOST_STEPS = 200
 """Most steps of a descent, rejected ones included; most need a dozen."""
 

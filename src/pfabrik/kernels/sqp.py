@@ -79,6 +79,8 @@ CONTROL = np.dtype(
         ("is_restoring", "i8"),  # 1 if feasibility is restored after each step
         ("is_warm", "i8"),  # 1 if a descent goes on from where the last one ended: its multipliers are a good guess
         ("stays", "i8"),  # 1: no step is longer than what keeps a working mode
+        ("linearised", "i8"),  # configurations that all searches of a row linearised
+        ("bound", "i8"),  # how many they may; 0: any
         ("closed", "f8"),  # objective at the last feasible configuration
     ]
 )

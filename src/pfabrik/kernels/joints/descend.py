@@ -43,6 +43,7 @@ from .linearise_loops import (
     open_scratch,
     pose_gradient,
     price_curvature,
+    steps_left,
     walk_all,
 )
 from .loops import BALL, LOCKED, Closed, Loops, Objective
@@ -299,10 +300,10 @@ def descend(loops: Loops, row: int, objective: Objective, scratch: DescentScratc
     scratch.gradient.unit[0] = scale_objective(reduced.linear)
     begin_descent(reduced.linear, hessian, control)
     control["is_done"] = int(is_on_edge(objective.pose, scratch.gradient))
-    while control["is_done"] == 0:
+    while control["is_done"] == 0 and steps_left(control) > RESTORING + 2:
         control["largest"] = lagrangian_hessian(loops, row, objective, scratch, reduced)
         is_accepted = False
-        while not is_accepted and control["is_done"] == 0:
+        while not is_accepted and control["is_done"] == 0 and steps_left(control) > RESTORING + 2:
             if plan_step(reduced.linear, hessian, control, most, p):
                 copy_state(best, trial)
                 share = take_step(loops, reduced, p.x, trial, scratch)
