@@ -161,8 +161,11 @@ def descend_from(tables: JointTables, scratch: JointScratch, aim: int, begin: in
         steps,
     )
     copy_closed(scratch.start, trial)
+    least = scratch.tally[0]["least"]
+    scratch.descent.control[0]["least"] = least if least < math.inf else 0.0
     objective = Objective(pose, scratch.no_weights, scratch.no_anchors)
     nearest_of(tables.loops, 0, objective, scratch.descent, trial, scratch.no_multipliers)
+    scratch.descent.control[0]["least"] = 0.0
     distance = distance_of(tables, scratch, aim, trial)
     note(scratch, aim, begin, int(trial.iterations[0]), distance)
     if not (distance < math.inf and count_ending(distance, scratch.tally[0])):
