@@ -17,9 +17,9 @@ from checks import INTERPRETED
 
 SCRIPT = Path(__file__).with_name("changed_constants.py")
 GUARDS = {
-    "search_constants": "LAST SOLVABLE",
+    "search_constants": "LAST SOLVABLE FILLED UNBOUNDED",
     "pose.pose_constants": "NEAR_INCUMBENT STRETCHED BENT",
-    "joints.joint_constants": "MOST_DAMPING FEW",
+    "joints.joint_constants": "MOST_DAMPING FEW FEWEST_LINEARISED",
     "chains.chain_constants": "ALONG PULLED_TURN ON_BOUND MOST_DAMPING LEAST_PIVOT NOTHING RESTORED PULLED_FROM PULLS "
     "BENT DESCENTS_NEARBY",
     "passes.pass_constants": "CONTENT OBLIQUE LARGEST_TURN TURN_DAMPING NO_LENGTH NO_SIDE WELL_INSIDE LEAST_SHARE "

@@ -63,7 +63,7 @@ def test_rows_that_are_none_are_named_or_marked_and_spoil_nothing(name: str) -> 
     assert pf.track(mechanism, targets, options=Options(on_invalid="mark")).jumps.tolist() == 5 * [False]
     values = np.tile(home_values(mechanism), (5, 1))
     values[1, 0], values[3, -1] = np.nan, np.inf
-    bounded = Options(most_steps=8) if engine_of(mechanism).bounds_steps else Options()
+    bounded = Options(most_steps=16)
     questions = ((pf.solve_ik, targets, Options()), (pf.solve_ik, targets, bounded), (pf.solve_fk, values, Options()))
     for solve, asked, options in questions:
         with pytest.raises(InvalidArgument, match="target" if asked is targets else "actuators") as caught:

@@ -16,7 +16,6 @@ from links import thick_hexaglide
 from machines import EVERY, FILES, machine
 from oracles import Array, far_poses, is_pose, no_poses, rough_pose, targets_about
 from pfabrik import Mechanism, Options, Solution, Solver, Status
-from pfabrik.engines.engine import engine_of
 from pfabrik.errors import InvalidArgument
 from pfabrik.machine.poses import are_poses
 
@@ -66,7 +65,7 @@ def test_every_way_to_be_no_pose_is_invalid_and_any_finite_pose_is_answered(name
     home = m.home_pose
     targets = np.concatenate([no_poses(home), home[None], rough_pose(home)[None], far_poses(home)])
     n = len(no_poses(home))
-    for most_steps in (None, 5) if engine_of(m).bounds_steps else (None,):
+    for most_steps in (None, 5):
         answers = pf.solve_ik(m, targets, options=Options(on_invalid="mark", most_steps=most_steps))
         assert (answers.status[:n] == Status.INVALID).all() and (answers.status[n : n + 2] == Status.REACHED).all()
         assert (answers.status[n + 2 :] <= Status.PROJECTED).all()
@@ -94,7 +93,7 @@ def questions(draw: st.DrawFn, m: Mechanism) -> tuple[Array, Options, Any]:
         for place in draw(st.sets(st.tuples(st.integers(0, 3), st.integers(0, 3)), min_size=1, max_size=2)):
             targets[(row, *place)] = draw(PER_ENTRY)
     options = Options(
-        most_steps=draw(st.sampled_from((None, 1, 20))) if engine_of(m).bounds_steps else None,
+        most_steps=draw(st.sampled_from((None, 1, 20))),
         working_mode=draw(st.sampled_from((None, "any", "keep"))),
         hold=draw(st.sampled_from((None, "orientation", "position"))),
         rotation_length=draw(st.sampled_from((None, m.characteristic_length))),

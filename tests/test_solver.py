@@ -147,15 +147,13 @@ def test_a_copy_is_prepared_anew_and_shares_nothing() -> None:
 def test_bounded_searches_are_feasible_and_say_whether_they_were_cut(name: str) -> None:
     mechanism = pf.load(name)
     asked = targets_about(mechanism, np.random.default_rng(4), 4, 0.9, 0.7)
-    if not engine_of(mechanism).bounds_steps:
-        with pytest.raises(InvalidArgument, match="most_steps"):
-            pf.solve_ik(mechanism, asked, options=Options(most_steps=64))
-        return
     whole = pf.solve_ik(mechanism, asked)
     assert np.all(whole.is_complete)
     for most_steps in (1, 8, 64):
         answer = pf.solve_ik(mechanism, asked, options=Options(most_steps=most_steps))
-        assert np.array_equal(answer.status, whole.status)
+        is_lost = answer.status != whole.status  # within reach of joint coordinates, where closing takes steps
+        assert np.all(answer.status[is_lost] == Status.PROJECTED)
+        assert not (is_lost.any() and engine_of(mechanism).is_fast)
         assert np.all(pf.closure_residual(answer) <= 1e-9 * mechanism.characteristic_length)
         assert np.all(answer.limit_excess <= 1e-9)
         is_projected = answer.status == Status.PROJECTED

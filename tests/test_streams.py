@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -38,9 +40,14 @@ def steps(machine: Mechanism, answers: list[Solution]) -> np.ndarray:
 
 def cost(machine: Mechanism, solution: Solution, price: float) -> np.ndarray:
     """Distance plus price of the orientation [L]."""
-    length, rotation = machine.characteristic_length, solution.rotation_error
+    return cost_of(machine, solution.position_error, solution.rotation_error, price)
+
+
+def cost_of(machine: Mechanism, position: float | np.ndarray, rotation: float | np.ndarray, price: float) -> np.ndarray:
+    """The same of errors [length], [rad]."""
+    length = machine.characteristic_length
     lever = np.linalg.norm(machine.platform_points.mean(axis=0) - machine.reference_point)
-    distance = np.hypot(solution.position_error, machine.rotation_length * rotation) / length
+    distance = np.hypot(position, machine.rotation_length * rotation) / length
     return np.asarray(distance + (price + lever / length) * rotation)
 
 
@@ -150,3 +157,37 @@ def test_without_a_start_nothing_has_jumped() -> None:
 def test_a_price_is_positive(price: float) -> None:
     with pytest.raises(InvalidArgument):
         Options(hold_price=price)
+
+
+def two_arms() -> Mechanism:
+    """Two arms of seven hinges that hold a box between them: joints in loops, without closed forms, and redundant."""
+    arm, joints = pf.load("panda"), []
+    hand = arm.home_pose[:3, 3]
+    for side, about in (("left", 0.0), ("right", np.pi)):
+        turn = Rotation.from_euler("z", about).as_matrix()
+        middle = hand + (0.1 * arm.characteristic_length, 0.0, 0.0)
+        for each in arm.joints:
+            bodies = [{"base": "base", arm.end_effector: "box"}.get(body, f"{side} {body}") for body in each.connects]
+            at = turn @ (np.array(each.at) - middle) + middle
+            moved = replace(each, name=f"{side} {each.name}", connects=tuple(bodies), at=at, axis=turn @ each.axis)
+            joints.append(moved)
+    return Mechanism("two arms", joints, "box", tuple(hand + (0.1 * arm.characteristic_length, 0.0, 0.0)))
+
+
+def test_two_arms_follow_a_stream_out_of_reach_and_back() -> None:
+    """Every answer is closed within limits, none costs more than the one before, and finer steps are shorter."""
+    machine = two_arms()
+    ticks, farthest = 20 if INTERPRETED else 300, []
+    for n in (ticks, 2 * ticks):
+        targets = smooth(machine, n)
+        answers = stream(machine, targets)
+        farthest.append(steps(machine, answers).max())
+        assert max(pf.closure_residual(each) for each in answers) <= 1e-9 * machine.characteristic_length
+        assert max(each.limit_excess for each in answers) <= 1e-9
+        for before, after, target in zip(answers, answers[1:], targets[1:], strict=False):
+            if after.status is Status.PROJECTED:
+                off = float(np.linalg.norm(before.pose[:3, 3] - target[:3, 3]))
+                turn = Rotation.from_matrix(before.pose[:3, :3].T @ target[:3, :3]).magnitude()
+                stayed = cost_of(machine, off, turn, PRICE)
+                assert cost(machine, after, PRICE) <= stayed + 1e-9
+    assert farthest[1] <= 0.76 * farthest[0] or INTERPRETED

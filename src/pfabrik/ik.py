@@ -117,7 +117,7 @@ def _answers_by_blocks(
 ) -> Configurations:
     """As `_answers`, in blocks, on the workers of an executor or here, with progress told behind each."""
     blocks = []
-    parts = slices(len(targets), 1 if choose_engine(mechanism).bounds_steps else SLOWER)
+    parts = slices(len(targets), 1 if choose_engine(mechanism).is_fast else SLOWER)
     for block in parts:
         rows = np.arange(len(targets))[block]
         is_each = begin is not None and len(begin) > 1
@@ -141,8 +141,6 @@ def _answers(
     if begin is not None and before is not None and _is_certified(begin, before, targets, options):
         return begin
     keep_mode, engine = keeps_mode(options, begin), choose_engine(mechanism)
-    if options.most_steps and not engine.bounds_steps:
-        raise InvalidArgument("options.most_steps", repr(options.most_steps), "None, as legs have no closed form")
     if options.most_steps and begin is not None and not _is_feasible(mechanism, begin):
         raise InvalidArgument(
             "start", "none that is feasible", "loops closed, limits kept: with most_steps it may answer"

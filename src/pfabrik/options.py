@@ -48,7 +48,7 @@ class Options:
     most_steps : int or None
         How many configurations the search for a projection may linearise in all; None for no bound. What it finds until
         then is feasible, the start itself at worst, and `Solution.is_complete` is False. For control loops: from a near
-        start, answers are good. Of machines whose legs have closed forms.
+        start, answers are good. Where legs have no closed form, steps that close loops on a target count too.
     on_invalid : {"raise", "mark"}
         What a row of a batch that is no pose does: "raise", or "mark" the row INVALID.
     """

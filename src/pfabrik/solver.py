@@ -89,7 +89,10 @@ class Solver:
         prepare(mechanism)
         engine, keep_mode = engine_of(mechanism), keeps_mode(self.options, start)
         self._rows, self._target = new_rows(model_of(mechanism), 1), np.eye(4)[None]
-        self._prepared = engine.prepared(self._target, begin, self._rows, keep_mode=keep_mode)
+        is_bounded = self.options.most_steps is not None and not engine.is_fast
+        self._prepared = None
+        if not is_bounded:
+            self._prepared = engine.prepared(self._target, begin, self._rows, keep_mode=keep_mode)
         self._prepared_forward = engine.prepared_forward(begin, self._rows)
         self._reach, self._assemble = (call and call[0] for call in (self._prepared, self._prepared_forward))
         self._forward = np.empty((3 if mechanism.end_effector_is_joint else 6, len(mechanism.actuator_names)))

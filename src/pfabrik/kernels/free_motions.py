@@ -9,7 +9,7 @@ import numpy as np
 from ..common.arrays import Floats, Ints
 from ._jit import routine
 from .qp import QP, factorise, solve_qp
-from .search_constants import IMPLIED, LOOSE, SHARED
+from .search_constants import FILLED, IMPLIED, LOOSE, SHARED
 from .sqp import Linearisation, new_linearisation
 
 
@@ -109,9 +109,15 @@ def solve_row(row: int, rank: int, rows: int, least: float, elimination: Elimina
         if A[rank, j] != 0.0:
             columns[n_filled] = j
             n_filled += 1
+    width = n + 1 + rows
+    is_dense = width < FILLED * n_filled
     for i in range(rows):
         entry = A[i, pivot]
-        if i != rank and entry != 0.0:
+        if i != rank and entry != 0.0 and is_dense:  # a loop over all of them is a vector
+            for k in range(width):
+                A[i, k] -= entry * A[rank, k]
+            A[i, pivot] = 0.0
+        elif i != rank and entry != 0.0:
             for k in range(n_filled):
                 A[i, columns[k]] -= entry * A[rank, columns[k]]
             A[i, pivot] = 0.0

@@ -11,6 +11,7 @@ from ._jit import routine
 from .joints.loops import LOCKED
 from .rows import HOLD_POSITION
 from .search_constants import SAME_DISTANCE
+from .search_constants import UNBOUNDED as UNBOUNDED
 
 # Objectives of a part that is held: exactly, up to its price, and that rounded off farther.
 HELD, PRICED, COARSE = 0, 1, 2
@@ -48,9 +49,6 @@ ATTEMPT = np.dtype(
     ]
 )
 """One search in a log of all."""
-
-UNBOUNDED = 2**31 - 1
-"""More steps than are ever taken; an integer of a controller has 32 bits."""
 
 
 @routine

@@ -21,6 +21,9 @@ SHORTEST_SHARE = 1.0 / 8192.0
 """Shortest step of a continuation, as a share of the way: where even that does not contract, a parallel singularity, or
 a limit, ends the assembly mode."""
 
+UNBOUNDED = 2**31 - 1
+"""More steps than are ever taken; an integer of a controller has 32 bits."""
+
 MOST_STEPS = 200
 """Most steps of a descent, rejected ones included; most need a dozen."""
 
@@ -101,6 +104,10 @@ and largest relative difference of the two for which a full step lowers it much.
 LEAST_DAMPING, LARGE_DAMPING = 0.01, 0.1
 """Damping, in units of curvature: least after a rejected step; largest that an exact step divides by 100, not 10."""
 
+HOPELESS = 8.0
+"""A search is given up if its distance to the incumbent's objective exceeds the last predicted reduction by this
+factor, unless damping kept the step short."""
+
 SOLVABLE = 1e-8
 """Least damping, in units of curvature, for a programme that rounding keeps from its solution."""
 
@@ -121,6 +128,9 @@ IMPLIED = 1e-6
 
 LOOSE = 4.0
 """Largest entry left of such an equation where equations are not met, in units of the gap."""
+
+FILLED = 4
+"""An equation of which more than one entry in so many is not zero is taken from the others as a whole."""
 
 SHARED = 0.01
 """Factor for pivots of unknowns that legs have in common: they would couple the legs' equations."""

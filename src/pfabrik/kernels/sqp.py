@@ -30,6 +30,7 @@ from .search_constants import (
     FINE,
     FIRST_DAMPING,
     GOOD,
+    HOPELESS,
     LARGE_DAMPING,
     LAST,
     LEAST_DAMPING,
@@ -79,6 +80,9 @@ CONTROL = np.dtype(
         ("is_restoring", "i8"),  # 1 if feasibility is restored after each step
         ("is_warm", "i8"),  # 1 if a descent goes on from where the last one ended: its multipliers are a good guess
         ("stays", "i8"),  # 1: no step is longer than what keeps a working mode
+        ("linearised", "i8"),  # configurations that all searches of a row linearised
+        ("bound", "i8"),  # how many they may; 0: any
+        ("least", "f8"),  # distance of the nearest end of the searches before; 0: of none
         ("closed", "f8"),  # objective at the last feasible configuration
     ]
 )
@@ -380,3 +384,16 @@ def judge_step(linear: Linearisation, other: Linearisation, is_feasible: bool, s
         control["damping"] = damping if damping > 1e-8 * largest else 0.0
     control["is_rejected"] = 0 if is_accepted else 1
     return is_accepted
+
+
+@routine
+def is_hopeless(deficit: float, share: float, control: Record) -> bool:
+    """True if a search will not come as near as the incumbent, going by its last predicted reduction.
+
+    Parameters
+    ----------
+    deficit : by how much the objective exceeds the incumbent's.
+    share : of the last step taken.
+    """
+    is_damped = control["damping"] > LARGE_DAMPING * control["largest"]
+    return bool(not is_damped and HOPELESS * control["predicted"] < share * deficit)

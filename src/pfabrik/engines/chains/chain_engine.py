@@ -68,7 +68,8 @@ class ChainEngine(Engine):
         begin = self._home if start is None else start.coordinates
         if not self._are_idle_within(begin):
             return self._joint_space.answer(targets, start, options, keep_mode=keep_mode)
-        n_missed, answers = self._run(question_of(start is not None, keep_mode, nearby=nearby), options, targets, begin)
+        question = question_of(start is not None, keep_mode, nearby=nearby, most_steps=options.most_steps)
+        n_missed, answers = self._run(question, options, targets, begin)
         failed = np.flatnonzero(answers.rows.status > PROJECTED) if n_missed else np.zeros(0, np.intp)
         if len(failed):
             block = start if start is None or len(start) == 1 else start.at(failed)
@@ -134,7 +135,8 @@ class ChainEngine(Engine):
         model, begin, rows = self.model, joint_coordinates(self.model, start), None
         if self._are_idle_within(begin):
             scratch, tables = Handle(new_scratch(model, MOST_NOTED)), tables_of(model, options).record
-            _, answer = self._run(question_of(start is not None, keep_mode), options, target, begin, scratch=scratch)
+            question = question_of(start is not None, keep_mode, most_steps=options.most_steps)
+            _, answer = self._run(question, options, target, begin, scratch=scratch)
             rows, noted = answer.rows, scratch.record.log[: scratch.record.effort["searches"][0]]
             for phase, searches in groupby(noted, lambda each: int(each["phase"])):
                 held = held_words(int(tables.holds[phase]), tables.prices[phase, 0])
@@ -174,7 +176,8 @@ class ChainEngine(Engine):
 
     def _follow_some(self, targets: Floats, start: Configurations | None, options: Options) -> Configurations:
         """The answers to the first targets of a path, up to one that is not reached."""
-        question, begin = question_of(start is not None, True, nearby=True), joint_coordinates(self.model, start)
+        question = question_of(start is not None, True, nearby=True, most_steps=options.most_steps)
+        begin = joint_coordinates(self.model, start)
         _, answers = self._run(question, options, targets, begin, follows=True)
         status = answers.rows.status
         status[self._joint_space.too_near(answers)] = TOO_NEAR

@@ -32,11 +32,17 @@ if TYPE_CHECKING:
 
 @lru_cache(maxsize=16)
 def question_of(
-    has_start: bool, keeps_mode: bool, *, nearby: bool = False, last: int = NEAREST, seeds: int = UNBOUNDED
+    has_start: bool,
+    keeps_mode: bool,
+    *,
+    nearby: bool = False,
+    last: int = NEAREST,
+    seeds: int = UNBOUNDED,
+    most_steps: int | None = None,
 ) -> Handle[Question]:
     """The question of all rows: BY_LEGS to reach targets only, else the nearest, from so many seeds at most."""
     asked = np.zeros(1, QUESTION)
-    asked[0] = False, BY_LEGS, last, has_start, keeps_mode, nearby, seeds, UNBOUNDED, UNBOUNDED, 0, 0.0
+    asked[0] = False, BY_LEGS, last, has_start, keeps_mode, nearby, seeds, UNBOUNDED, UNBOUNDED, most_steps or 0, 0.0
     return Handle(Question(asked))
 
 

@@ -18,15 +18,18 @@ from ...kernels.rows import (
     HOLD,
     INVALID,
     LIMIT_EXCESS,
+    OPEN,
     POSITION_ERROR,
     PROJECTED,
     REACHED,
     RESIDUAL,
     ROTATION_ERROR,
+    Rows,
 )
 from ...machine.model import Model
 from ...machine.motion.displacements import centres
 from ...machine.motion.limited_coordinates import within_turns
+from ...machine.motion.singularities import loop_blocks
 from ...machine.poses import are_poses
 from ...options import USUAL, Options
 from ...tolerances import TOLERANCES
@@ -41,8 +44,8 @@ from .configurations import (
     steps_of,
     write_closing,
 )
-from .engine_contract import Counted, Engine, Grower
-from .joint_answers import answer_rows, logged, near_rows, question_of
+from .engine_contract import Counted, Engine, Grower, Prepared
+from .joint_answers import answer_rows, logged, near_rows, prompt_call, question_of
 from .link_distances import clearance_excess
 from .placed_links import placed_at
 from .projection import ProjectionMode, projection_multipliers
@@ -59,7 +62,7 @@ class ClosureEngine(Engine):
         self, targets: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Configurations:
         """Solve for targets (n, 4, 4) independently, from one start or one for each; INVALID where no pose."""
-        question = question_of(ANSWER, keep_mode, start is not None)
+        question = question_of(ANSWER, keep_mode, start is not None, most_steps=options.most_steps)
         return self._answer(targets, start_coordinates(self.model, start), options, question)
 
     def _answer(
@@ -92,14 +95,30 @@ class ClosureEngine(Engine):
 
         With `nearby` they stay around their starts; so they do with `keep_mode`.
         """
-        question = question_of(NEAREST, keep_mode or nearby, start is not None)
+        question = question_of(NEAREST, keep_mode or nearby, start is not None, most_steps=options.most_steps)
         return self._answer(targets, joint_coordinates(self.model, start), options, question)
+
+    def prepared(self, target: Floats, start: Configurations | None, rows: Rows, *, keep_mode: bool) -> Prepared | None:
+        """As `Engine.prepared`, for targets that one closing of the loops reaches."""
+        model, mechanism = self.model, self.model.mechanism
+        is_told = model.task.is_whole_pose and not (_has_side_loops(model) or (keep_mode and loop_blocks(mechanism)))
+        if not is_told or mechanism.clearance is not None:
+            return None
+        call, kept = prompt_call(model, target, start_coordinates(model, start), rows, keep_mode, start is not None)
+
+        def reach() -> int:
+            rows.status[0] = OPEN
+            call()
+            return int(rows.status[0] != REACHED)
+
+        return reach, kept
 
     def attempts(
         self, target: Floats, start: Configurations | None, options: Options, *, keep_mode: bool
     ) -> Iterator[Attempt]:
         """As `InverseEngine.attempts`: closing the loops on the target, then searches for the nearest configuration."""
-        question, begin = question_of(ANSWER, keep_mode, start is not None), start_coordinates(self.model, start)
+        question = question_of(ANSWER, keep_mode, start is not None, most_steps=options.most_steps)
+        begin = start_coordinates(self.model, start)
         yield from attempts_of(*logged(self.model, target, begin, options, question), self.model.length)
 
     def follow(
@@ -125,7 +144,7 @@ class ClosureEngine(Engine):
         self, target: Floats, begin: Floats, options: Options, bent: BentConfiguration, has_start: bool
     ) -> Configurations:
         """Solve one target of a path, also from the last bent configuration if links are stretched out."""
-        question = question_of(ANSWER, True, has_start)
+        question = question_of(ANSWER, True, has_start, most_steps=options.most_steps)
         answer = self._answer(target, begin, options, question)
         if bent.coordinates is not None:
             bent_answer = self._answer(target, bent.coordinates, options, question)

@@ -58,10 +58,10 @@ class InverseEngine(ABC):
 
     Attributes
     ----------
-    bounds_steps : True if `Options.most_steps` bounds its searches.
+    is_fast : True if a search takes no joint coordinates: blocks of rows are larger then.
     """
 
-    bounds_steps = False
+    is_fast = False
 
     @abstractmethod
     def answer(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,15 @@ from ...common.batch import take
 from ...common.derived import derived, is_derived
 from ...kernels.handle import Handle, Scratch
 from ...kernels.joints.joint_constants import A_DESCENT, MOST_CLOSING, NEARBY, STARTS, STEPS
-from ...kernels.joints.joint_tables import ASKED, MACHINE, Answered, JointQuestion, JointTables, new_joint_scratch
+from ...kernels.joints.joint_tables import (
+    ASKED,
+    MACHINE,
+    PROMPT,
+    Answered,
+    JointQuestion,
+    JointTables,
+    new_joint_scratch,
+)
 from ...kernels.joints.loops import LOCKED
 from ...kernels.legs.records import TASK
 from ...kernels.rows import OPEN, Rows
@@ -20,6 +29,7 @@ from ...kernels.search_constants import CONTINUATION_STEPS
 from ...kernels.threads import in_blocks
 from ...machine.description.home_mobility import column_moves
 from ...machine.model import Model
+from ...machine.motion.mobility import generic_of
 from ...options import USUAL, Options
 from ...tolerances import TOLERANCES
 from .close import CLOSED, in_lengths, locking
@@ -111,13 +121,30 @@ def logged(
     return scratch.record.log[: scratch.record.logged[0]], tables.record.holds, tables.record.prices
 
 
+def prompt_call(
+    model: Model, target: Floats, begin: Floats, rows: Rows, keep_mode: bool, has_start: bool
+) -> tuple[Callable[[], int], object]:
+    """A call that reaches the pose in `target` in one step from joint coordinates, into `rows`, and what it needs."""
+    from ...kernels.joints.answer_joints import answer_joints
+
+    tables, question = prepared(model, USUAL, False)[0], question_of(PROMPT, keep_mode, has_start)
+    scratch = Handle(new_joint_scratch(tables.record, *links_on_paths(model.mechanism)))
+    answers = Answered(begin.copy(), rows.counters, rows.poses, rows.actuators, rows.measures)
+    addresses = tables.address, scratch.address, question.address
+    return partial(answer_joints, *addresses, target, begin, answers, rows.status), (tables, scratch, question)
+
+
 @lru_cache(maxsize=64)
 def question_of(
-    verb: int, keeps_mode: bool = False, has_start: bool = False, leg_by_leg: bool = False
+    verb: int,
+    keeps_mode: bool = False,
+    has_start: bool = False,
+    leg_by_leg: bool = False,
+    most_steps: int | None = None,
 ) -> Handle[JointQuestion]:
     """The question of all targets."""
     asked = np.zeros(1, ASKED)
-    asked[0] = verb, keeps_mode, has_start, leg_by_leg
+    asked[0] = verb, keeps_mode, has_start, leg_by_leg, most_steps or 0
     return Handle(JointQuestion(asked))
 
 
@@ -156,6 +183,7 @@ def _prepared(
         "has_others": has_others,
         "asks_all": has_others and (asks_too_much(closure) or (with_seeds and len(nearby) < NEARBY)),
         "is_point": mechanism.end_effector_is_joint,
+        "is_redundant": generic_of(mechanism).mobility.internal > 0,
         "has_seeds": with_seeds,
         "closing_steps": steps_within(closure, MOST_CLOSING),
         "search_steps": steps_within(closure, STEPS),

@@ -73,7 +73,7 @@ class LegsEngine(Engine):
     def __init__(self, model: Model) -> None:
         self.model, self._table = model, model.legs
         self._joint_space, self._single = ClosureEngine(model), SingleTarget(model)
-        self.bounds_steps, self._keeps_apart = self.searches, len(links_of_legs(model).pairs) > 0
+        self.is_fast, self._keeps_apart = self.searches, len(links_of_legs(model).pairs) > 0
 
     @cached_property
     def _assembly(self) -> LegsAssembly:

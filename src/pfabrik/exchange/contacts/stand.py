@@ -36,8 +36,8 @@ def stand(
     """A robot on its feet: an ordinary mechanism, whose end effector is the trunk and whose base is the ground.
 
     What held the trunk, or let it float, goes; joints keep their names and the signs of their coordinates. Contacts
-    hold both ways: a foot neither slides nor lifts, whatever the load (`forces` with `friction` tells). `interop.from_mjcf` and `from_urdf` do the same
-    (`feet=`), and tell what was left out or changed.
+    hold both ways: a foot neither slides nor lifts, whatever the load; `forces` with `friction` tells how near it is to
+    that. `interop.from_mjcf` and `from_urdf` do the same (`feet=`), and tell what was left out or changed.
 
     Parameters
     ----------

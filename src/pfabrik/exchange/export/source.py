@@ -102,7 +102,7 @@ def _reached_around_home(mechanism: Mechanism) -> tuple[Floats, Solution]:
 
 def _options(mechanism: Mechanism) -> Options:
     """Options of the library's answers, in home's mode; some of its engines do not count steps."""
-    return Options(working_mode="keep", most_steps=STEPS_OF_CHECKS if engine_of(mechanism).bounds_steps else None)
+    return Options(working_mode="keep", most_steps=STEPS_OF_CHECKS if engine_of(mechanism).is_fast else None)
 
 
 def _distances(solution: Solution) -> Floats:

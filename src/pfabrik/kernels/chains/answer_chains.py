@@ -9,6 +9,7 @@ from .._jit import routine, search
 from ..legs.complete_poses import is_pose, orthonormalise
 from ..pose.answer_row import errors
 from ..pose.tables import BY_LEGS
+from ..projecting import UNBOUNDED
 from ..rows import (
     FAILED,
     HOLD,
@@ -91,20 +92,26 @@ def answer_chain(
     chain, columns, effort = tables.chain, tables.columns, s.effort[0]
     if not is_pose(asked):
         return PENDING
-    effort["steps"], effort["searches"], effort["most"] = 0, 0, question["effort"]
+    effort["steps"] = effort["searches"] = 0
     for j in range(coordinates.shape[0]):
         s.coordinates[j] = coordinates[j] * columns[j]["moves"] * columns[j]["scale"]
     is_clipped = read_target(tables.machine[0], asked, s)
     load_chain(chain, s.coordinates, True, s.start)
     walk_chain(chain, s.start, s)
     copy_table(s.X, s.start_X)
+    most = question["most_steps"]
+    effort["most"] = (most + 1) // 2 if most > 0 else UNBOUNDED
     error = reach(tables, question, s)
+    effort["most"] = most if most > 0 else UNBOUNDED
     if is_clipped or error > tables.machine[0]["met"]:
         if question["last"] == BY_LEGS:
             return PENDING
         copy_chain_state(s.nearest, s.own)
         if project(tables, question, has_start, s) == math.inf:
-            return FAILED
+            if most == 0:
+                return FAILED
+            copy_chain_state(s.start, s.nearest)
+            copy_table(s.start_X, s.nearest_X)
     return write_answer(tables, s, coordinates, row, rows)
 
 

@@ -10,6 +10,7 @@ from ..joints.linearise_loops import begin_pricing
 from ..joints.loops import BASE_AXES, LOCKED, PoseObjective
 from ..legs.complete_poses import turn_pose
 from ..linear import solve_spd
+from ..projecting import is_spent
 from ..quaternions import difference
 from ..search_constants import MOST_STEPS
 from ..vectors import copy_table, norm, vec
@@ -54,6 +55,8 @@ def descend_chain(
     estimate_multipliers(chain, held, s)
     damping, predicted, is_kept = FIRST_DAMPING, math.inf, True
     for _ in range(MOST_STEPS):
+        if is_spent(s.effort[0]):
+            break
         s.effort[0]["steps"] += 1
         if value <= NOTHING or abs(predicted) <= CONVERGED * value or damping > MOST_DAMPING:
             break

@@ -13,6 +13,7 @@ from .._jit import routine
 from ..joints.linearise_loops import pose_gradient
 from ..joints.loops import PoseObjective
 from ..linear import solve_spd
+from ..projecting import is_spent
 from .chain_constants import LONGEST_STEP, PATIENCE, PROGRESS, REACH_DAMPING, REACH_SWEEPS
 from .chain_records import ChainScratch, ChainState, SerialChain
 from .walk_chain import bound_steps, copy_chain_state, move_chain, walk_chain
@@ -48,7 +49,7 @@ def reach_target(
     distance, held = measure_pose(chain, target, objective, state, s)
     value = squares(errors, held)
     damping, idle, steps = 1e-3, 0, 0
-    while steps < most_steps and largest(errors, held) > closeness and idle < PATIENCE:
+    while steps < most_steps and largest(errors, held) > closeness and idle < PATIENCE and not is_spent(s.effort[0]):
         steps += 1
         s.effort[0]["steps"] += 1
         plan_least_step(chain, s, held, damping * min(1.0, value), keeps)

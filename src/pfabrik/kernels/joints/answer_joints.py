@@ -48,12 +48,14 @@ from .close_on_target import (
     reach,
     start_at,
     take_nearby,
+    walk,
 )
 from .descend import nearest_of
 from .joint_constants import (
     AGREEMENTS,
-    APART,
     FEWEST,
+    FEWEST_LINEARISED,
+    FOLDED,
     LONG_CHAIN_STEPS,
     MOST_CLOSING,
     NEAR,
@@ -69,6 +71,7 @@ from .joint_tables import (
     EXPECTED,
     MACHINE,
     NEAREST,
+    PROMPT,
     TO_CLOSE,
     Answered,
     JointQuestion,
@@ -76,6 +79,7 @@ from .joint_tables import (
     JointTables,
     new_joint_scratch,
 )
+from .linearise_loops import steps_left
 from .loops import BASE_AXES, LOCKED, Closed, Objective, PoseObjective
 from .path_kinematics import LAYOUT, LOOPS, are_apart, load_row
 
@@ -143,6 +147,8 @@ def move_to_held(tables: JointTables, scratch: JointScratch, aim: int, start: Cl
 def descend_from(tables: JointTables, scratch: JointScratch, aim: int, begin: int, steps: int) -> bool:
     """Search from `scratch.start` by a projection, into `scratch.trial`, and count the end; True if it is nearest."""
     machine, trial = tables.machine[0], scratch.trial
+    if steps_left(scratch.descent.control[0]) < FEWEST_LINEARISED:
+        return False
     pose = PoseObjective(
         scratch.target,
         tables.weights[aim],
@@ -155,8 +161,11 @@ def descend_from(tables: JointTables, scratch: JointScratch, aim: int, begin: in
         steps,
     )
     copy_closed(scratch.start, trial)
+    least = scratch.tally[0]["least"]
+    scratch.descent.control[0]["least"] = least if least < math.inf else 0.0
     objective = Objective(pose, scratch.no_weights, scratch.no_anchors)
     nearest_of(tables.loops, 0, objective, scratch.descent, trial, scratch.no_multipliers)
+    scratch.descent.control[0]["least"] = 0.0
     distance = distance_of(tables, scratch, aim, trial)
     note(scratch, aim, begin, int(trial.iterations[0]), distance)
     if not (distance < math.inf and count_ending(distance, scratch.tally[0])):
@@ -189,7 +198,8 @@ def search_by(
         measure_nearby(tables, scratch)
     for number in range(last + 1 if moves_start else last):
         is_last, seed = number == last, number - n_starts
-        if tally["agreements"] >= AGREEMENTS or (is_last and (tally["least"] < math.inf or not holds)):
+        is_spent = steps_left(scratch.descent.control[0]) < FEWEST_LINEARISED
+        if is_spent or tally["agreements"] >= AGREEMENTS or (is_last and (tally["least"] < math.inf or not holds)):
             break
         begin = AT_START if is_last or number == 0 else (AT_END if seed < 0 else seed + 1)
         if begin > n_seeds:
@@ -316,9 +326,9 @@ def stays_in_mode(tables: JointTables, scratch: JointScratch, question: Record, 
         return True
     copy_table(target, wished)
     copy_table(closed.poses[0], target)
-    is_reached = reach(tables, scratch, question, -1)
+    walk(tables, scratch, -1)
     copy_table(wished, target)
-    return is_reached and farthest(tables, closed, scratch.reached) <= APART
+    return farthest(tables, closed, scratch.reached) <= FOLDED
 
 
 @routine
@@ -352,6 +362,8 @@ def project(tables: JointTables, scratch: JointScratch, question: Record, n_star
         scratch.descent.control[0]["stays"] = question["keeps_mode"]
         distance = project_from(tables, scratch, scratch.begin, steps, answer)
         scratch.descent.control[0]["stays"] = 0
+        if keeps_mode and distance < math.inf and machine["is_redundant"] == 0:
+            distance = distance if stays_in_mode(tables, scratch, question, answer) else math.inf
         if distance < math.inf and (keeps_mode or before - distance_left(tables, scratch, answer) <= WORTH):
             return
     if steps > 0:
@@ -453,19 +465,23 @@ def answer_row(
 ) -> int:
     """Answer a target (4, 4) [length] from a start (columns,) [length or rad]; the status, OPEN if it takes seeds."""
     verb, follows, links = question["verb"], tables.machine[0]["follows"] == 1, scratch.descent.links
+    control = scratch.descent.control[0]
     if not is_pose(target):
         return put_invalid(row, answers)
     load_pose(target, tables.task[0]["length"], scratch.target[0])
     orthonormalise(scratch.target[0])
     for j in range(tables.scale.shape[0]):
         scratch.begin.coordinates[0, j] = begin[j] * tables.scale[j]
+    control["bound"], control["linearised"] = question["most_steps"], 0
     pose_platform(tables, scratch, scratch.begin)
     scratch.logged[0] = 0
     n_starts = 1 if question["keeps_mode"] == 1 or follows or verb == NEAREST else 2
     links.kept[0] = links.pairs.shape[0] if verb == NEAREST else 0
     if verb != NEAREST:
-        is_hurried = verb == ANSWER and question["keeps_mode"] == 1
+        is_hurried = verb == PROMPT or (verb == ANSWER and question["keeps_mode"] == 1)
+        control["bound"] = (question["most_steps"] + 1) // 2
         is_reached = reach(tables, scratch, question, PATIENCE if is_hurried else -1)
+        control["bound"] = question["most_steps"]
         if is_reached and not keeps_clearance(tables, scratch, scratch.reached):
             is_reached, n_starts, links.kept[0] = False, 1, links.pairs.shape[0]
         note(scratch, TO_CLOSE, AT_START, int(scratch.reached.iterations[0]), 0.0 if is_reached else math.inf)
@@ -484,6 +500,8 @@ def answer_row(
         links.kept[0] = links.pairs.shape[0]
         project(tables, scratch, question, 1)
     status = put_answer(tables, scratch, row, target, scratch.answer, int(tables.holds[0]), answers)
+    if control["bound"] > 0:
+        answers.counters[row, ITERATIONS] = control["linearised"]
     return status if links.kept[0] == 0 or keeps_clearance(tables, scratch, scratch.answer) else FAILED
 
 

@@ -12,8 +12,8 @@ from ..search_constants import CLOSED, CONTINUATION_STEPS, LONGEST_IN_MODE
 from ..vectors import copy_row, copy_table, norm, scale, vec
 from .close import close_row
 from .joint_constants import BRANCH_AGREEMENTS, MOST_CLOSING, SAME_GAP, STEPS, STRANGE
-from .joint_tables import EXPECTED, REACH, STEP, JointScratch, JointTables
-from .linearise_loops import turn_of_tilt
+from .joint_tables import EXPECTED, PROMPT, REACH, STEP, JointScratch, JointTables
+from .linearise_loops import steps_left, turn_of_tilt
 from .loops import BASE_AXES, Closed, ClosureProblem
 from .path_kinematics import end_path, load_row, store_row, walk_path
 
@@ -79,7 +79,8 @@ def close_legs(
     to: Closed,
 ) -> None:
     """Close the legs of a start, within limits or without, below a platform held at a pose; or measure them."""
-    closing, machine = scratch.closing, tables.machine[0]
+    closing, machine, control = scratch.closing, tables.machine[0], scratch.descent.control[0]
+    most = min(most, steps_left(control))
     inside, centres, follow = machine["inside"], scratch.no_centres, 1 - limits
     problem = ClosureProblem(held, frame, centres, limits, inside, follow, 0, 0, patience, CLOSED, most)
     for j in range(tables.moves.shape[0]):
@@ -89,6 +90,7 @@ def close_legs(
     layout = tables.layout if limits == 1 else tables.following
     to.iterations[0] = close_row(tables.loops, layout, problem, 0, closing, to)
     store_row(tables.loops, 0, closing.best, to)
+    control["linearised"] += to.iterations[0]
 
 
 @routine
@@ -274,7 +276,7 @@ def search_from_nearby(tables: JointTables, scratch: JointScratch, is_whole: boo
     machine, best, start, trial = tables.machine[0], scratch.reached, scratch.start, scratch.trial
     measure_nearby(tables, scratch)
     for _ in range(min(machine["nearby"], scratch.distances.shape[0])):
-        if is_feasible(tables, best):
+        if is_feasible(tables, best) or steps_left(scratch.descent.control[0]) == 0:
             break
         place = take_nearby(scratch)
         start_at(tables, tables.nearby[place], best, start)
@@ -323,7 +325,8 @@ def search_from_random(
         agreed = 0.0
         for group in range(scratch.agreements.shape[0]):
             agreed = max(agreed, scratch.agreements[group])
-        if is_feasible(tables, best) or agreed >= BRANCH_AGREEMENTS:
+        is_spent = steps_left(scratch.descent.control[0]) == 0
+        if is_feasible(tables, best) or agreed >= BRANCH_AGREEMENTS or is_spent:
             break
         start_at(tables, tables.random[k], best, start)
         for j in range(group_of.shape[0]):
@@ -362,22 +365,22 @@ def reach(tables: JointTables, scratch: JointScratch, question: Record, patience
     """
     machine, task, pose, begin, best = tables.machine[0], tables.task[0], scratch.pose, scratch.begin, scratch.reached
     verb, follows = question["verb"], machine["follows"] == 1
-    is_fixed, is_step, is_completed = follows or machine["is_whole"] == 1, verb == STEP, True
+    is_fixed, is_step, is_completed = follows or machine["is_whole"] == 1, verb in (STEP, PROMPT), True
     complete(task, scratch.target[0], begin.poses[0], pose)
     is_beyond = machine["is_whole"] == 1 and is_beyond_reach(tables, pose)
     if verb == EXPECTED and not is_beyond:
         return reach_as_expected(tables, scratch, question["leg_by_leg"] == 1)
     if follows:
         is_completed = complete_by_loops(tables, scratch, is_step)
-    if patience > 0 and is_beyond:
+    position, rotation = errors(task, begin.poses[0], pose, scratch.turn)
+    is_long = question["keeps_mode"] == 1 and math.hypot(position, rotation) > LONGEST_IN_MODE
+    if patience > 0 and (is_beyond or (is_long and verb == PROMPT)):
         copy_closed(begin, best)
         return False
     most = STEPS if is_step else int(machine["closing_steps"])
     close_below(tables, scratch, begin, pose, is_fixed, most, patience, best)
     if is_step or is_beyond:
         return is_completed and is_feasible(tables, best)
-    position, rotation = errors(task, begin.poses[0], pose, scratch.turn)
-    is_long = question["keeps_mode"] == 1 and math.hypot(position, rotation) > LONGEST_IN_MODE
     if is_long or not is_feasible(tables, best):
         continue_to(tables, scratch, pose, is_fixed, 1, patience, scratch.trial)
         put_better(tables, scratch.trial, best)
@@ -394,6 +397,17 @@ def reach(tables: JointTables, scratch: JointScratch, question: Record, patience
             complete(task, scratch.target[0], begin.poses[0], pose)
             search_from_random(tables, scratch, pose, is_whole, False, best)
     return is_feasible(tables, best)
+
+
+@routine
+def walk(tables: JointTables, scratch: JointScratch, patience: int) -> None:
+    """Lead the platform from its pose at the start to the target, in the working mode, into `scratch.reached`."""
+    machine, pose = tables.machine[0], scratch.pose
+    follows = machine["follows"] == 1
+    complete(tables.task[0], scratch.target[0], scratch.begin.poses[0], pose)
+    if follows:
+        complete_by_loops(tables, scratch, False)
+    continue_to(tables, scratch, pose, follows or machine["is_whole"] == 1, 1, patience, scratch.reached)
 
 
 @routine

@@ -22,6 +22,7 @@ from ..sqp import (
     allowed_violation,
     begin_descent,
     is_closed,
+    is_hopeless,
     is_stuck_infeasible,
     judge_step,
     longest,
@@ -43,6 +44,7 @@ from .linearise_loops import (
     open_scratch,
     pose_gradient,
     price_curvature,
+    steps_left,
     walk_all,
 )
 from .loops import BALL, LOCKED, Closed, Loops, Objective
@@ -298,11 +300,12 @@ def descend(loops: Loops, row: int, objective: Objective, scratch: DescentScratc
     hessian, control, most = scratch.hessian, scratch.control[0], objective.pose.max_iterations
     scratch.gradient.unit[0] = scale_objective(reduced.linear)
     begin_descent(reduced.linear, hessian, control)
+    nearest = math.inf if control["least"] == 0.0 else 0.5 * scratch.gradient.unit[0] * control["least"] ** 2
     control["is_done"] = int(is_on_edge(objective.pose, scratch.gradient))
-    while control["is_done"] == 0:
+    while control["is_done"] == 0 and steps_left(control) > RESTORING + 2:
         control["largest"] = lagrangian_hessian(loops, row, objective, scratch, reduced)
         is_accepted = False
-        while not is_accepted and control["is_done"] == 0:
+        while not is_accepted and control["is_done"] == 0 and steps_left(control) > RESTORING + 2:
             if plan_step(reduced.linear, hessian, control, most, p):
                 copy_state(best, trial)
                 share = take_step(loops, reduced, p.x, trial, scratch)
@@ -313,7 +316,8 @@ def descend(loops: Loops, row: int, objective: Objective, scratch: DescentScratc
                 if is_accepted:
                     copy_state(trial, best)
                     reduced, trial_reduced = trial_reduced, reduced
-                    if is_on_edge(objective.pose, scratch.gradient):
+                    deficit = reduced.linear.totals[0]["value"] - nearest
+                    if is_on_edge(objective.pose, scratch.gradient) or is_hopeless(deficit, share, control):
                         control["is_done"] = 1
             if is_stuck_infeasible(reduced.linear, is_accepted, most, control):
                 if restore_feasibility(loops, row, objective, best, CLOSED, scratch, reduced):

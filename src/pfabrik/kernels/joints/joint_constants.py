@@ -49,6 +49,9 @@ NEAR = 2
 """Random feasible configurations, the nearest to a target out of reach, that searches start from, too: on a machine of
 two arms more answers come nearer so than random closings on the target would bring."""
 
+FEWEST_LINEARISED = 20
+"""Configurations for which a search is begun: it may restore its start, and its end, in eight steps each."""
+
 NEARLY = 1e-2
 """Distance from its target below which loops are closed once more on it, from where a descent ended [L]."""
 
@@ -103,5 +106,6 @@ PROJECTIONS = 12
 LONGEST_SEARCH = 3.0
 """Largest change of an actuator value, if the target values are too far for a search to converge [L or rad]."""
 
-APART = 1e-3
-"""Difference of joint coordinates above which two configurations of one pose are not the same [L or rad]."""
+FOLDED = 0.05
+"""Difference of joint coordinates up to which where a walk ends is where a descent did: to a fold, where most nearest
+configurations are, it comes no nearer [L or rad]."""

@@ -14,15 +14,17 @@ from .linearise_loops import DescentScratch, new_descent_scratch
 from .loops import Closed, Layout, Loops
 
 # What is asked of a target: one step there, the platform brought there in the working mode of the start; searches in
-# other modes too, then for the nearest configuration; only the latter; loops closed where the start lets expect them.
-STEP, REACH, ANSWER, NEAREST, EXPECTED = 0, 1, 2, 3, 4
+# other modes too, then for the nearest configuration; only the latter; loops closed where the start lets expect them;
+# one step there, if it is no longer than keeps the mode.
+STEP, REACH, ANSWER, NEAREST, EXPECTED, PROMPT = 0, 1, 2, 3, 4, 5
 
 ASKED = np.dtype(
     [
-        ("verb", "i8"),  # STEP ... EXPECTED
+        ("verb", "i8"),  # STEP ... PROMPT
         ("keeps_mode", "i8"),  # 1: searches stay around the start
         ("has_start", "i8"),  # 1: the start was given, 0: it is home
         ("leg_by_leg", "i8"),  # 1: of loops closed as expected, each leg may be searched for alone
+        ("most_steps", "i8"),  # configurations that may be linearised in all; 0 if there is no bound
     ]
 )
 """What is asked of targets."""
@@ -36,6 +38,7 @@ MACHINE = np.dtype(
         ("has_others", "i8"),  # 1: where it follows, other assembly modes reach other targets
         ("asks_all", "i8"),  # 1: these are searched for from random starts, too
         ("is_point", "i8"),  # 1: the end effector is a joint
+        ("is_redundant", "i8"),  # 1: actuators move while the end effector rests
         ("has_seeds", "i8"),  # 1: seeds, and the other starts of searches, are known
         ("closing_steps", "i8"),  # most steps that close loops on a target
         ("search_steps", "i8"),  # and from other starts

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...common.arrays import Floats, Records
+from ...common.arrays import Floats, Record, Records
 from .._jit import opener, routine
 from ..clearance.link_limits import new_link_limits, pair_excess
 from ..clearance.link_records import NO_LINKS, LinkLimits
@@ -23,7 +23,7 @@ from ..free_motions import (
 from ..qp import QP, new_qp
 from ..quaternions import UPSIDE_DOWN, difference, yaw_difference
 from ..rows import HOLD_ORIENTATION
-from ..search_constants import REACH
+from ..search_constants import REACH, UNBOUNDED
 from ..sqp import CONTROL, Hessian, new_hessian
 from ..vectors import Vec, cross, dot, norm, scale
 from .loops import BALL, BASE_AXES, HALF_WAY, LOCKED, TARGET_AXES, Loops, Objective, PoseObjective
@@ -388,6 +388,7 @@ def linearise(
 ) -> None:
     """Linearise loops, objective and limits at a configuration into `reduced`."""
     linear, n, here = reduced.linear, len(loops.lo), scratch.here
+    scratch.control[0]["linearised"] += 1
     gap = walk_all(loops, state, scratch)
     value, held = pose_gradient(objective.pose, objective.pose.targets[row], state.X, scratch.gradient, True)
     for k in range(held):
@@ -401,6 +402,12 @@ def linearise(
     eliminate(rows, scratch.elimination, reduced, rows, 0)
     project_gradient(scratch.here, reduced)
     linearise_limits(loops, objective.pose.margin, state, scratch, reduced)
+
+
+@routine
+def steps_left(control: Record) -> int:
+    """How many configurations may still be linearised."""
+    return int(max(control["bound"] - control["linearised"], 0)) if control["bound"] > 0 else UNBOUNDED
 
 
 @routine

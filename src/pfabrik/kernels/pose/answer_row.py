@@ -459,8 +459,8 @@ def project(
 ) -> float:
     """Fill the nearest feasible pose; its distance, with the price of what is held [L].
 
-    From a start one descent leads to it. Others are searched for only where it leads nowhere, or so far that the start
-    is no answer to a target before this one.
+    From a start one descent leads to it. Others are searched for only where it leads nowhere; in any mode also where it
+    leads so far that the start is no answer to a target before this one.
     """
     machine, other, target, distance = tables.machine[0], scratch.other, targets[0], math.inf
     seeds, nearest = 0 if question["is_nearby"] == 1 else question["seeds"], scratch.anew
@@ -468,7 +468,7 @@ def project(
         distance = project_from(tables, scratch, start.poses[0], start.sides, targets, question, answer)
     if distance < math.inf:
         before = distance_of(tables, scratch, target, start.poses[0])
-        is_settled = answer.status[0] == REACHED or answer.counters[0, HOLD] >= CERTAIN
+        is_settled = question["keeps_mode"] == 1 or answer.status[0] == REACHED or answer.counters[0, HOLD] >= CERTAIN
         if is_settled or before - distance_of(tables, scratch, target, answer.poses[0]) <= WORTH:
             seeds = 0
     if seeds > 0 or distance == math.inf:

@@ -14,11 +14,12 @@ from ..free_motions import FreeMotions, put_step, restoring_step
 from ..joints.linearise_loops import begin_pricing
 from ..legs.records import Table
 from ..projecting import is_over
-from ..search_constants import CLOSED, CORRECTIONS, LARGE_DAMPING, LONGEST_STEP, NEARLY_CLOSED, RESTORING
+from ..search_constants import CLOSED, CORRECTIONS, LONGEST_STEP, NEARLY_CLOSED, RESTORING
 from ..sqp import (
     allowed_violation,
     begin_descent,
     is_closed,
+    is_hopeless,
     is_stuck_infeasible,
     judge_step,
     longest,
@@ -33,7 +34,6 @@ from .equations import PlatformState, close_rods
 from .linearise import lagrangian_hessian, linearise
 from .pose_constants import (
     ARRIVED,
-    HOPELESS,
     MISSES,
     NEAR,
     NEAR_INCUMBENT,
@@ -128,19 +128,6 @@ def has_same_curvature(reduced: FreeMotions, before: FreeMotions, control: Recor
         if reduced.pivots[r] != before.pivots[r]:
             return False
     return True
-
-
-@routine
-def is_hopeless(deficit: float, share: float, control: Record) -> bool:
-    """True if a search will not come as near as the incumbent, going by its last predicted reduction.
-
-    Parameters
-    ----------
-    deficit : by how much the objective exceeds the incumbent's.
-    share : of the last step taken.
-    """
-    is_damped = control["damping"] > LARGE_DAMPING * control["largest"]
-    return bool(not is_damped and HOPELESS * control["predicted"] < share * deficit)
 
 
 @routine

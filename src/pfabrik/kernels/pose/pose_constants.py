@@ -9,10 +9,6 @@ the third number times the last step, but not below the second."""
 NEAR_LINKS = 0.1
 """Pairs of links that are farther than this beyond the clearance are left out of a programme [L]."""
 
-HOPELESS = 8.0
-"""A search is given up if its distance to the incumbent's objective exceeds the last predicted reduction by this
-factor, unless damping kept the step short."""
-
 ARRIVED = 1e-12
 """Distance from the target that counts as none [L]."""
 
