@@ -22,6 +22,7 @@ from machines.closure import ON_ARMS
 from machines.redescribed import moved, relabelled, scaled
 from pfabrik import PoseRegion, Status
 from pfabrik.capabilities.certify.following import what_follows
+from pfabrik.capabilities.certify.pose_region import rounded
 from pfabrik.capabilities.certify.subdividing import Subdividing, first_cells, region_parameters, units_of
 from pfabrik.cli import main
 from pfabrik.engines.pose.table import kernel_table
@@ -642,12 +643,11 @@ def test_drives_without_rows_leave_singularities_open() -> None:
 
 
 def thick_machines() -> Iterator[Any]:
-    """Links that come near each other before anything else does, between base, platform and cranks."""
+    """Links that come near each other before anything else does."""
     shape = pf.Shape
     for name, shapes, size in (
         ("rps", [shape(f"rod{i}", thickness=100.0, between=(f"A{i}", f"C{i}")) for i in (1, 2, 3)], 1.2),
         ("ankle_ups", [shape(f"rod{i}", thickness=60.0, between=(f"A{i}", f"C{i}")) for i in "LR"], 1.2),
-        ("ankle_rss", [shape(f"rod{i}", thickness=78.0) for i in "LR"], 0.34),
     ):
         machine = pf.load(name).without_limits().with_shapes(shapes).with_clearance(1.0)
         yield pytest.param(machine, tilts(machine), size, id=name)
@@ -663,6 +663,15 @@ def test_links_are_proved_apart_over_tilts(machine: pf.Mechanism, make: Any, top
     assert_holds_of(machine, make(0.97 * border), proved.margin, rng)
     assert refuted.refutation is not None and refuted.refutation.limit[1] == "clearance"
     assert refuted.refutation.answer.status == Status.PROJECTED
+
+
+def test_links_on_cranks_are_proved_apart_over_tilts() -> None:
+    shapes = [pf.Shape(f"rod{i}", thickness=70.0) for i in "LR"]
+    machine, rng = pf.load("ankle_rss").with_shapes(shapes).with_clearance(1.0), np.random.default_rng(3)
+    region = tilts(machine)(0.25)
+    proved = pf.certify(machine, region, tolerance=0.2 if INTERPRETED else 5e-3)
+    assert proved and 0.0 < proved.margin
+    assert_holds_of(machine, region, proved.margin, rng)
 
 
 def assert_holds_of(machine: pf.Mechanism, region: PoseRegion, margin: float, rng: np.random.Generator) -> None:
@@ -728,6 +737,36 @@ def test_ten_million_random_poses_of_what_is_proved_are_feasible() -> None:
     for name in POSITIONED:
         for _ in range(60):
             assert_holds(pf.certify(pf.load(name), random_region(name, rng)), 20_000, rng)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", FOLLOWING)
+def test_no_pose_and_no_descent_refutes_what_is_proved_of_tilts(name: str) -> None:
+    """A million random poses, and descents of the margin from the worst of them; twice, of the region and its border."""
+    machine, make, top = FOLLOWING[name]
+    rng = np.random.default_rng(11)
+    border = border_by_brute_force(machine, make, top, 250_000, rng)
+    region = make(0.99 * border)
+    proved, refuted = pf.certify(machine, region), pf.certify(machine, make(1.01 * border))
+    assert proved and refuted.verdict == "REFUTED"
+    least = []
+    for _ in range(10):
+        points = drawn_in(region, 100_000, rng)
+        poses = region.pose(points)
+        assert (np.asarray(pf.solve_ik(machine, poses).status) == Status.REACHED).all()
+        margin = np.asarray(pf.feasibility(machine, poses).margin)
+        assert margin.min() >= proved.margin - 1e-9
+        least.append(points[np.argmin(margin)])
+
+    def margin_at(point: np.ndarray) -> float:
+        return float(
+            pf.feasibility(machine, region.pose(rounded(region, np.clip(point, region.low, region.high)))).margin
+        )
+
+    for start in least:
+        bounds = list(zip(region.low, region.high, strict=True))
+        found = minimize(margin_at, start, bounds=bounds, method="Powell")
+        assert margin_at(found.x) >= proved.margin - 1e-9
 
 
 @pytest.mark.campaign
