@@ -22,6 +22,7 @@ from machines.closure import ON_ARMS
 from machines.redescribed import moved, relabelled, scaled
 from pfabrik import PoseRegion, Status
 from pfabrik.capabilities.certify.following import what_follows
+from pfabrik.capabilities.certify.pose_region import rounded
 from pfabrik.capabilities.certify.subdividing import Subdividing, first_cells, region_parameters, units_of
 from pfabrik.cli import main
 from pfabrik.engines.pose.table import kernel_table
@@ -30,6 +31,7 @@ from pfabrik.kernels.certify.implicit_pose import put_pose
 from pfabrik.kernels.certify.limit_rows import first_link_row, first_reach_row, put_limits
 from pfabrik.kernels.certify.pose_cells import ROTATION_VECTOR, CellParameters, put_cell
 from pfabrik.kernels.certify.prove import new_rows
+from pfabrik.kinematics import parallel_signs
 from pfabrik.machine.files import loads
 from pfabrik.machine.model import model_of
 
@@ -403,6 +405,9 @@ def test_the_command_says_what_the_function_says(tmp_path: Path) -> None:
     assert np.allclose(refutation["pose"], expected.pose)
     code, text = said("--ball", "0,0,210,20", "--tilt", "5", "--yaw=-3:3")
     assert code == 0 and "margin at least" in text
+    ankle = ("certify", "ankle_rss", "--joints", "pivot[0]=-10:10,pivot[1]=-8:8", "--singular")
+    result = CliRunner().invoke(main, ankle)
+    assert result.exit_code == 0 and "none is singular" in result.stdout
     path = tmp_path / "path.csv"
     path.write_text("x,y,z\n0,0,200\n10,0,205\n500,0,205\n", encoding="utf-8")
     code, text = said("--track", str(path))
@@ -515,9 +520,7 @@ def test_tilts_are_proved_up_to_the_border_that_brute_force_finds(name: str) -> 
     border = border_by_brute_force(machine, make, top, 3000, rng)
     proved, refuted = (pf.certify(machine, make(share * border)) for share in (0.985, 1.01))
     assert proved and not len(proved.open_boxes) and refuted.verdict == "REFUTED"
-    poses = make(0.985 * border).pose(drawn_in(make(0.985 * border), 3000, rng))
-    assert (np.asarray(pf.solve_ik(machine, poses).status) == Status.REACHED).all()
-    assert pf.feasibility(machine, poses).margin.min() >= proved.margin - 1e-9
+    assert_holds_of(machine, make(0.985 * border), proved.margin, rng)
     refutation = refuted.refutation
     assert refutation is not None and pf.solve_ik(machine, refutation.pose).status == Status.PROJECTED
 
@@ -599,6 +602,84 @@ def as_parameters(pose: np.ndarray, parameters: CellParameters, length: float) -
     return found
 
 
+def sides(machine: pf.Mechanism, poses: np.ndarray) -> np.ndarray:
+    """Sides of the parallel singularities of answers, from Jacobians in joint coordinates; 1 is home's."""
+    answers = pf.solve_ik(machine, np.concatenate([machine.home_pose[None], poses]))
+    signs = parallel_signs(machine, answers.q, pf.forward_jacobian(answers))
+    return np.asarray(signs[1:] * signs[0])
+
+
+@pytest.mark.skipif(INTERPRETED, reason="thousands of cells take long as plain Python")
+@pytest.mark.parametrize(
+    ("name", "regular", "singular"),
+    [("stewart", 0.6, 1.7), ("rps", 0.8, 1.25), ("ankle_ups", 0.6, 0.9), ("tricept", 0.8, 1.5)],
+)
+def test_locked_drives_hold_the_platform_where_it_is_proved(name: str, regular: float, singular: float) -> None:
+    machine = pf.load(name).without_limits()
+    at, length, rng = machine.home_pose[:3, 3], machine.characteristic_length, np.random.default_rng(2)
+
+    def region(size: float) -> PoseRegion:
+        if name == "stewart":
+            return PoseRegion.box(at - 5.0, at + 5.0, tilt=0.1, yaw=[-size, size])
+        return PoseRegion.box(at, at, tilt=size) if name != "tricept" else box_about(at, size * length)
+
+    proved = pf.certify(machine, region(regular), singular=True)
+    assert proved and proved.replay() and "none is singular" in str(proved)
+    assert (sides(machine, region(regular).pose(drawn_in(region(regular), 500, rng))) == 1.0).all()
+    refuted = pf.certify(machine, region(singular), singular=True)
+    refutation = refuted.refutation
+    assert refutation is not None and refutation.limit[1] == "singularity"
+    assert sides(machine, refutation.pose[None]) == [-1.0]
+    assert pf.certify(machine, region(singular)).refutation is None
+
+
+def test_drives_without_rows_leave_singularities_open() -> None:
+    """Hinges of a pivot are driven; planar machines have fewer than six rows."""
+    for name in ("agile_eye", "rrr"):
+        machine = pf.load(name)
+        at = machine.home_pose[:3, 3]
+        certificate = pf.certify(machine, PoseRegion.box(at, at), singular=True)
+        assert certificate.verdict == "OPEN" and "determinant" in certificate.reason
+
+
+def thick_machines() -> Iterator[Any]:
+    """Links that come near each other before anything else does."""
+    shape = pf.Shape
+    for name, shapes, size in (
+        ("rps", [shape(f"rod{i}", thickness=100.0, between=(f"A{i}", f"C{i}")) for i in (1, 2, 3)], 1.2),
+        ("ankle_ups", [shape(f"rod{i}", thickness=60.0, between=(f"A{i}", f"C{i}")) for i in "LR"], 1.2),
+    ):
+        machine = pf.load(name).without_limits().with_shapes(shapes).with_clearance(1.0)
+        yield pytest.param(machine, tilts(machine), size, id=name)
+
+
+@pytest.mark.skipif(INTERPRETED, reason="thousands of cells take long as plain Python")
+@pytest.mark.parametrize(("machine", "make", "top"), list(thick_machines()))
+def test_links_are_proved_apart_over_tilts(machine: pf.Mechanism, make: Any, top: float) -> None:
+    rng = np.random.default_rng(4)
+    border = border_by_brute_force(machine, make, top, 2000, rng)
+    proved, refuted = pf.certify(machine, make(0.97 * border)), pf.certify(machine, make(1.02 * border))
+    assert proved and border < 0.98 * top
+    assert_holds_of(machine, make(0.97 * border), proved.margin, rng)
+    assert refuted.refutation is not None and refuted.refutation.limit[1] == "clearance"
+    assert refuted.refutation.answer.status == Status.PROJECTED
+
+
+def test_links_on_cranks_are_proved_apart_over_tilts() -> None:
+    shapes = [pf.Shape(f"rod{i}", thickness=70.0) for i in "LR"]
+    machine, rng = pf.load("ankle_rss").with_shapes(shapes).with_clearance(1.0), np.random.default_rng(3)
+    region = tilts(machine)(0.25)
+    proved = pf.certify(machine, region, tolerance=0.2 if INTERPRETED else 5e-3)
+    assert proved and 0.0 < proved.margin
+    assert_holds_of(machine, region, proved.margin, rng)
+
+
+def assert_holds_of(machine: pf.Mechanism, region: PoseRegion, margin: float, rng: np.random.Generator) -> None:
+    poses = region.pose(drawn_in(region, 2000, rng))
+    assert (np.asarray(pf.solve_ik(machine, poses).status) == Status.REACHED).all()
+    assert pf.feasibility(machine, poses).margin.min() >= margin - 1e-9
+
+
 def test_regions_of_joints_are_refused_by_name() -> None:
     ankle = pf.load("ankle_ups")
     for ranges, words in (
@@ -656,6 +737,36 @@ def test_ten_million_random_poses_of_what_is_proved_are_feasible() -> None:
     for name in POSITIONED:
         for _ in range(60):
             assert_holds(pf.certify(pf.load(name), random_region(name, rng)), 20_000, rng)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", FOLLOWING)
+def test_no_pose_and_no_descent_refutes_what_is_proved_of_tilts(name: str) -> None:
+    """A million random poses, and descents of the margin from the worst of them; twice, of the region and its border."""
+    machine, make, top = FOLLOWING[name]
+    rng = np.random.default_rng(11)
+    border = border_by_brute_force(machine, make, top, 250_000, rng)
+    region = make(0.99 * border)
+    proved, refuted = pf.certify(machine, region), pf.certify(machine, make(1.01 * border))
+    assert proved and refuted.verdict == "REFUTED"
+    least = []
+    for _ in range(10):
+        points = drawn_in(region, 100_000, rng)
+        poses = region.pose(points)
+        assert (np.asarray(pf.solve_ik(machine, poses).status) == Status.REACHED).all()
+        margin = np.asarray(pf.feasibility(machine, poses).margin)
+        assert margin.min() >= proved.margin - 1e-9
+        least.append(points[np.argmin(margin)])
+
+    def margin_at(point: np.ndarray) -> float:
+        return float(
+            pf.feasibility(machine, region.pose(rounded(region, np.clip(point, region.low, region.high)))).margin
+        )
+
+    for start in least:
+        bounds = list(zip(region.low, region.high, strict=True))
+        found = minimize(margin_at, start, bounds=bounds, method="Powell")
+        assert margin_at(found.x) >= proved.margin - 1e-9
 
 
 @pytest.mark.campaign

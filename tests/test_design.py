@@ -428,15 +428,31 @@ def test_proofs_of_three_freedoms_are_not_refuted(name: str) -> None:
     assert (np.asarray(pf.solve_ik(found.mechanism, poses).status) == Status.REACHED).all()
 
 
+PIVOTED = PoseRegion.joints({"Pivot[0]": (-0.2, 0.2), "Pivot[1]": (-0.15, 0.15)})
+
+
 @pytest.mark.parametrize(
-    "name, vary, height",
-    [("3-RPS", {"height": (150, 250), "longest": (200, 400)}, 10), ("ankle", {"crank": (20, 60)}, 0)],
+    "name, vary, region",
+    [
+        ("3-RPS", {"longest": (200, 400)}, PoseRegion.box([0, 0, -10], [0, 0, 10], tilt=0.1)),
+        ("ankle", {"crank": (20, 60)}, PoseRegion.box([0, 0, 0], [0, 0, 0], tilt=0.1)),
+        ("ankle", {"turn": (20, 90), "crank": (20, 60)}, PIVOTED),
+    ],
+    ids=["tripod", "tilts", "pivot"],
 )
-def test_a_tilting_machine_stays_open_and_says_why(name: str, vary: dict[str, Any], height: float) -> None:
-    region = PoseRegion.box([0, 0, -height], [0, 0, height], tilt=0.1)
+def test_a_tilting_machine_is_proved(name: str, vary: dict[str, Any], region: PoseRegion) -> None:
     found = pf.design(template(name), vary, region, keep=[keep.singularity(None)], about="home")
-    assert found.verdict == "OPEN" and "yaw" in found.reason and "ask for poses" in found.reason
-    assert [each.verdict for each in found.rounds].count("OPEN") == 1
+    assert found.verdict == "PROVED" and found.certificate is not None and found.mechanism is not None
+    asked = found.certificate.region
+    assert asked is not None
+    ends = asked.low + np.random.default_rng(0).random((200, 6)).round() * (asked.high - asked.low)
+    poses = asked.pose(ends if asked.turning == "joints" else 0.7 * ends + 0.3 * asked.middle)
+    assert (np.asarray(pf.solve_ik(found.mechanism, poses).status) == Status.REACHED).all()
+
+
+def test_joints_that_move_a_position_of_the_task_are_refused() -> None:
+    with pytest.raises(pf.errors.InvalidArgument, match="joints that move"):
+        pf.design(template("tricept"), {"longest": (300, 500)}, PoseRegion.joints({"Slide": (280.0, 285.0)}))
 
 
 def asked_whole(name: str) -> pf.Mechanism:

@@ -27,6 +27,7 @@ from ...kernels.certify.prove import (
     DONE,
     FOUND_MARGIN,
     HALF,
+    LAST_ROW,
     LIMIT,
     N_OPEN,
     N_PROVED,
@@ -69,6 +70,9 @@ BUDGET = 200_000
 
 SAMPLES = 20_000
 """Random poses of a region of which links are left open, that may refute it: some hundredths of a second."""
+
+WORST, SIDES = 8, 200
+"""How many of the worst of them are solved for, and how many of them are asked for their side of singularities."""
 
 CELLS_A_ROUND, CELLS_A_BLOCK = 64, 20_000
 """On an executor: cells that workers subdivide at a time, and how many of its parts each looks at: some ten ms."""
@@ -157,6 +161,7 @@ class _Looked(NamedTuple):
     open : cells that are still to be looked at.
     left : cells too small to be halved, neither proved nor refuted.
     proved : proved cells, as many as are kept of `n_proved`.
+    last_row : the row that was not proved on the last cell that was not.
     n_doubts : number of poses out of reach in home's working mode, but reached in another.
     """
 
@@ -166,6 +171,7 @@ class _Looked(NamedTuple):
     proved: Floats
     n_proved: int
     n_cells: int
+    last_row: int
     n_doubts: int
     proved_margin: float
     found_margin: float
@@ -194,7 +200,7 @@ class _RegionQuestion:
             looked = self._look_elsewhere(executor, first, gap, budget, tell)
         reason, refutation = self._restriction(), looked.refutation
         if refutation is None and not looked.n_doubts and looked.ending in (SPENT, TOO_SMALL):
-            is_sampled = len(bounded_pairs(self.model)) or self.parameters.implicit.any()
+            is_sampled = len(bounded_pairs(self.model)) or self.parameters.implicit.any() or self.parameters.kinds[4]
             refutation = self._sampled() if is_sampled else None
         if refutation is not None:
             least_found = (
@@ -206,7 +212,7 @@ class _RegionQuestion:
             reason = reason or "some poses are reached in another working mode than home's"
         elif looked.ending != DONE:
             spent = f"after {looked.n_cells} cells" if looked.ending == SPENT else "cells became too small"
-            reason = reason or spent
+            reason = reason or f"{spent}, the last one at {self._open_at(looked.last_row)}"
         return self._certificate(OPEN if reason else PROVED, looked, reason, None, has_bounds)
 
     def look(self, cells: Floats, gap: float, budget: int, tell: OnProgress | None = None) -> _Looked:
@@ -226,6 +232,7 @@ class _RegionQuestion:
             work.proved[: min(n_proved, len(work.proved))],
             n_proved,
             subdividing.n_cells,
+            int(work.counters[LAST_ROW]),
             n_doubts,
             float(work.measures[PROVED_MARGIN]),
             float(work.measures[FOUND_MARGIN]),
@@ -264,6 +271,7 @@ class _RegionQuestion:
             proved,
             sum(part.n_proved for part in parts),
             n_cells,
+            parts[-1].last_row,
             n_doubts,
             min(part.proved_margin for part in parts),
             min(part.found_margin for part in parts),
@@ -319,26 +327,52 @@ class _RegionQuestion:
         else:
             assert self.poses is not None
             pose = step_poses(self.model, self.parameters, parameters[None, 1::-1])[0]
-        n_limits = len(self.model.legs.limits) + 2 * len(self.model.legs.legs)
-        if limit == n_limits + ROWS_A_PAIR * len(bounded_pairs(self.model)):
+        if limit == self._last_row:
+            if not side_at(self.model, self.parameters, parameters) < 0.0:
+                return None
             answer = solve_ik(self.model.mechanism, pose)
-            is_other = answer.status == Status.REACHED and side_at(self.model, self.parameters, parameters) < 0.0
-            return Refutation(pose, SINGULARITY, 0.0, answer) if is_other else None
+            return Refutation(pose, SINGULARITY, 0.0, answer) if answer.status == Status.REACHED else None
         return self._refuted_by(pose, limit)
 
     def _sampled(self) -> Refutation | None:
         """The refutation by the worst of random poses, half of them on sides of the region; None if all are within
-        limits: links may be too near where the worst corners of cells keep them apart."""
-        rng = np.random.default_rng(0)
+        limits: links may be too near where the worst corners of cells keep them apart. Then by one beyond a
+        singularity."""
+        rng, points = np.random.default_rng(0), None
         if self.region is not None:
-            poses = self.region.pose(drawn(self.region, SAMPLES, rng))
+            points = drawn(self.region, SAMPLES, rng)
+            poses = self.region.pose(points)
         else:
             steps = rng.integers(len(self.parameters.steps), size=SAMPLES)
             points = np.stack([steps.astype(float), rng.random(SAMPLES)], axis=1)
             poses = step_poses(self.model, self.parameters, points)
         feasible = feasibility(self.model.mechanism, poses)
-        worst = int(np.argmin(feasible.margin))
-        return self._refuted_by(poses[worst], 0) if feasible.margin[worst] < -BREAKS else None
+        for worst in np.argsort(feasible.margin)[:WORST].tolist():
+            if not feasible.margin[worst] < -BREAKS:
+                break
+            refutation = self._refuted_by(poses[worst], 0)
+            if refutation is not None:
+                return refutation
+        if not self.parameters.kinds[4] or self.region is None or self.parameters.implicit.any():
+            return None
+        units, origin = units_of(self.model, self.region)
+        found = (self._refuted((point - origin) / units, self._last_row) for point in points[:SIDES])
+        return next((refutation for refutation in found if refutation is not None), None)
+
+    @property
+    def _last_row(self) -> int:
+        """The row on the whole machine, behind those of limits and of links."""
+        table = self.model.legs
+        return len(table.limits) + 2 * len(table.legs) + ROWS_A_PAIR * len(bounded_pairs(self.model))
+
+    def _open_at(self, row: int) -> str:
+        """What is not proved, for messages."""
+        if row != self._last_row:
+            mechanism = self.model.mechanism
+            return " ".join(feasibility(mechanism, mechanism.home_pose).limits[self._place_of(row)])
+        if self.parameters.implicit.any():
+            return "a pose that legs do not determine, or hardly"
+        return "a pose that locked drives do not hold, or hardly"
 
     def _refuted_by(self, pose: Floats, limit: int) -> Refutation | None:
         """The refutation by a pose; None if `solve_ik` reaches it."""

@@ -42,11 +42,14 @@ class PosesToReach:
         self.region, self._rng, self.is_track = None, rng, isinstance(reach, Track)
         self.moves = np.where(task_of(mechanism).axes, float(about == "home"), 1.0)
         fixed = (self.moves - float(about == "home")) * mechanism.home_pose[:3, 3]
+        self._home = mechanism.home_pose[:3, 3]
         if isinstance(reach, PoseRegion):
-            region = _shifted(reach, -fixed)
-            require_task(mechanism, _shifted(region, self.moves * mechanism.home_pose[:3, 3]))
+            region = _shifted(reach.of(mechanism), -fixed)
+            require_task(mechanism, _shifted(region, self.moves * self._home))
+            if region.path is not None and task_of(mechanism).axes != (False, False, False):
+                raise InvalidArgument("reach", "joints that move what the task sets", "positions, tilts or rotations")
             self.region = region
-            self.poses = region.pose(np.concatenate([region.middle[None], corners(region)]))
+            self.poses = self._posed(np.concatenate([region.middle[None], corners(region)]))
             self.first = self.poses[:9]
         else:
             given = reach.targets if isinstance(reach, Track) else reach
@@ -55,6 +58,15 @@ class PosesToReach:
                 raise InvalidArgument("reach", "no poses, or rows that are none", "a PoseRegion, finite poses, a Track")
             self.poses[:, :3, 3] -= fixed
             self.first = self.poses[:: max(1, len(self.poses) // 8)]
+
+    def _posed(self, parameters: Floats) -> Floats:
+        """Poses (n, 4, 4) of parameters of the region (n, 6); of joints, rotations alone: they turn a task without a
+        position."""
+        assert self.region is not None
+        found = self.region.pose(parameters)
+        if self.region.path is not None:
+            found[:, :3, 3] = 0.0
+        return found
 
     def require_plane(self, mechanism: Mechanism, homes: Floats) -> None:
         """Raise if poses are out of the plane of a planar machine, whose reference point may be at homes (k, 3)."""
@@ -80,16 +92,16 @@ class PosesToReach:
             order = np.argsort(values)
             return self.poses[order], values[order]
         found = np.concatenate([region.middle[None], corners(region), drawn(region, count, self._rng)])
-        values = least(region.pose(found))
+        values = least(self._posed(found))
         best = _apart(found[np.argsort(values)], region.half)
         for size in SIZES:
             steps = self._rng.uniform(-size, size, (AROUND, len(best), 6)) * region.half
             steps[0] = 0.0
             near = rounded(region, np.clip(best + steps, region.low, region.high))
-            values = least(region.pose(near.reshape(-1, 6))).reshape(AROUND, -1)
+            values = least(self._posed(near.reshape(-1, 6))).reshape(AROUND, -1)
             best, values = near[values.argmin(axis=0), np.arange(len(best))], values.min(axis=0)
         order = np.argsort(values)
-        return region.pose(best[order]), values[order]
+        return self._posed(best[order]), values[order]
 
     def certificate(self, mechanism: Mechanism, **asked: Any) -> Certificate | None:
         """The certificate of a region or track; None of separate poses."""
@@ -117,6 +129,8 @@ def _apart(parameters: Floats, half: Floats) -> Floats:
 
 
 def _shifted(region: PoseRegion, shift: Floats) -> PoseRegion:
+    if region.path is not None:
+        return region
     moved = np.concatenate([shift, np.zeros(3)])
     return dataclasses.replace(region, low=region.low + moved, high=region.high + moved)
 

@@ -97,8 +97,9 @@ def cube(t: float) -> float:
     return t * t * t if t > 0.0 else 0.0
 
 
-# Counters: cells on the stack, proved, left open, looked at; the limit that a pose breaks; cells to look at, at most.
-N_STACK, N_PROVED, N_OPEN, N_CELLS, LIMIT, BUDGET, N_COUNTERS = 0, 1, 2, 3, 4, 5, 6
+# Counters: cells on the stack, proved, left open, looked at; the limit that a pose breaks; cells to look at, at most;
+# the row that was not proved on the last cell that was not.
+N_STACK, N_PROVED, N_OPEN, N_CELLS, LIMIT, BUDGET, LAST_ROW, N_COUNTERS = 0, 1, 2, 3, 4, 5, 6, 7
 # Measures: a proved lower bound of the margin; the least margin of the poses measured; a cell is proved where its
 # margin is at least that less this gap, or, if it is infinite, where the margin is positive.
 PROVED_MARGIN, FOUND_MARGIN, GAP, N_MEASURES = 0, 1, 2, 3
@@ -395,6 +396,7 @@ def prove(machine: int, subdivision: int) -> int:
         if row < 0:
             keep_proved(work, cell)
             continue
+        counters[LAST_ROW] = row
         put_corner(work, cell, row, corner)
         is_broken = False
         for i in range(N_PARAMETERS):
