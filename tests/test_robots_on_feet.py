@@ -240,11 +240,12 @@ def test_wrong_feet_are_named() -> None:
     cases: list[tuple[Any, dict[str, Any], type[PfabrikError], str]] = [
         (["nix"], {}, UnknownName, "nix"),
         (["FL"], {}, InvalidArgument, "body: found none"),
-        (["FL", "trunk"], {}, InvalidArgument, "'trunk', which does not hang on 'trunk'"),
+        (["FL", "trunk"], {}, InvalidArgument, "'trunk', which is fixed to 'trunk'"),
         ({"FL": "flot"}, {}, InvalidArgument, r"feet\['FL'\]: found 'flot'"),
         ({"FL": {"type": "edge"}, "FR": "point"}, {}, InvalidArgument, "axis: found none"),
         ({"FL": {"type": "point", "axis": (0, 0, 1)}, "FR": "point"}, {}, InvalidArgument, "none, for a point"),
         ({"FL": {"kind": "point"}}, {}, UnknownName, "kind"),
+        (["FL", "FR"], {"at": {"FL_calf_joint": "a"}}, InvalidArgument, "FL_calf_joint"),
         ([], {}, InvalidArgument, "feet"),
         ("FL", {}, InvalidArgument, "feet"),
         (["FL", "FR"], {"at": "nowhere"}, UnknownName, "nowhere"),
@@ -255,6 +256,63 @@ def test_wrong_feet_are_named() -> None:
     for feet, options, error, text in cases:
         with pytest.raises(error, match=text):
             pf.stand(dog(), feet, **options)
+
+
+def test_a_floating_base_is_put_wherever_it_was_at_home() -> None:
+    """States are in the mechanism's base coordinates: turned away, under another keyframe of the same joints, moved."""
+    away = np.array([1.0, 2.0, 0.5, np.cos(0.5), 0.0, 0.0, np.sin(0.5), *([0.1, 0.9, -1.7] * 4)])
+    key = '<key name="jump" qpos="1 2 3 0 0 0 1' + " 0 0.8 -1.6" * 4 + '"/><key name="home"'
+    jumping = dog().replace('<key name="home"', key)
+    moved = pf.stand(dog(), list(LEGS)).at(pf.pose([5.0, 0.0, 0.0], rotvec=[0.0, 0.0, 1.0]))
+    for machine, text in (
+        (pf.stand(dog(), list(LEGS), at=away), dog()),
+        (pf.stand(jumping, list(LEGS)), jumping),
+        (moved, dog()),
+    ):
+        model = mujoco.MjModel.from_xml_string(text)
+        answers = pf.solve_ik(machine, [machine.home_pose, *near_home(machine, 5, 0.05, 0.1)])
+        begin, *others = states(answers, model)
+        assert (answers.status == pf.Status.REACHED).all()
+        np.testing.assert_allclose(begin.body("trunk").xpos, machine.home_pose[:3, 3], atol=1e-9)
+        for state in others:
+            feet = [[each.geom(foot).xpos.copy() for foot in LEGS] for each in (begin, state)]
+            np.testing.assert_allclose(*feet, atol=1e-9)
+    np.testing.assert_allclose(
+        pf.interop.qpos(
+            pf.solve_ik(pf.stand(dog(), list(LEGS), at=away), pf.stand(dog(), list(LEGS), at=away).home_pose), dog()
+        ),
+        away,
+        atol=1e-9,
+    )
+    with pytest.raises(InvalidArgument, match="away from where the mechanism has them"):
+        pf.interop.qpos(pf.solve_ik(moved, moved.home_pose), dog().replace('pos="0.2 0.1 0"', 'pos="0.25 0.1 0"'))
+
+
+@pytest.mark.parametrize("trunk", ["welded", "waist"])
+def test_all_of_a_robot_weighs_on_its_feet(trunk: str) -> None:
+    """What is above the trunk, welded or by a joint that is left out, in a URDF or a model, is carried and not lost."""
+    joint = '<joint name="waist" axis="0 0 1"/>' if trunk == "waist" else ""
+    torso = f'<body name="torso" pos="0 0 0.1"><freejoint/><inertial pos="0 0 0" mass="20" diaginertia="1 1 1"/><body name="trunk">{joint}'
+    text = dog().replace('<body name="trunk" pos="0 0 0.5"><freejoint/>', torso)
+    text = text.replace("</body></worldbody>", "</body></body></worldbody>")
+    text = text.replace('qpos="0 0 0.3 1 0 0 0', 'qpos="0 0 0.3 1 0 0 0' + (" 0" if trunk == "waist" else ""))
+    machine = pf.stand(text, list(LEGS), body="trunk")
+    whole = float(mujoco.MjModel.from_xml_string(text).body_mass.sum())
+    assert sum(each.mass for each in machine.masses if each.body != machine.base) == pytest.approx(whole)
+    held = pf.forces(pf.solve_ik(machine, machine.home_pose), loads=weights(machine), friction=0.8)
+    assert sum(held.reactions[name][2] for name in held.spare) == pytest.approx(9.81 * whole)
+    rooted = (
+        biped()
+        .replace('<link name="pelvis">', f'<link name="rack">{BODY}<link name="pelvis">')
+        .replace(
+            "</robot>",
+            '<joint name="bolts" type="fixed"><parent link="rack"/><child link="pelvis"/></joint></robot>',
+        )
+    )
+    standing = pf.stand(rooted, {"left_sole": "flat", "right_sole": "flat"})
+    assert standing.base == "ground"
+    moving = {each.body: each.mass for each in standing.masses}
+    assert moving["pelvis"] == pytest.approx(2.0)
 
 
 def weights(machine: pf.Mechanism) -> Any:
@@ -420,6 +478,8 @@ def test_wrong_joins_are_named() -> None:
         (lambda: pf.join(end_effector="a"), "one or more mechanisms"),
         (lambda: pf.join(arm, arm, end_effector="flange"), "names of their own"),
         (lambda: pf.join(arm, pf.load("rpr"), end_effector="flange"), "one unit"),
+        (lambda: pf.grasp("a_link2", {"a": (arm, "flat")}), "a name of its own"),
+        (lambda: pf.grasp("box", {1: (arm, "flat")}), "a name"),  # type: ignore[dict-item]
         (lambda: pf.grasp("box", {}), "an arm and how it holds"),
         (lambda: pf.grasp("box", {"a": (arm, far)}), "the object's pose"),
         (lambda: pf.grasp("box", {"a": (arm, far)}, at=(9000.0, 0.0, 0.0)), "brings no nearer than"),
@@ -431,3 +491,6 @@ def test_wrong_joins_are_named() -> None:
     for call, text in cases:
         with pytest.raises(InvalidArgument, match=text):
             call()
+    low, high = pf.load("linear_delta"), pf.load("stewart")
+    with pytest.raises(UnknownName, match="did you mean 'platform'"):
+        pf.join(low, high.at((0.0, 0.0, 0.0), prefix="h_", base="plattform"), end_effector="h_platform")

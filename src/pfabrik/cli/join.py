@@ -57,7 +57,7 @@ def join(
     parts: list[pf.Mechanism] = []
     for mech, place, prefix in zip_longest(machines, places, prefixes):
         machine = load(mech)
-        parts.append(machine.at(_pose(place), prefix=prefix or "", base=carrier if parts else None))
+        parts.append(machine.at(_pose(place), prefix=prefix or "", base=(carrier or parts[0].base) if parts else None))
     joined = pf.join(*parts, end_effector=str(end_effector), task=task) if hold is None else _held(parts, hold, task)
     from ..machine.files import dumps
     from .remarks import remarks_on
@@ -72,15 +72,11 @@ def join(
 def _held(parts: list[pf.Mechanism], hold: str, task: list[str] | None) -> pf.Mechanism:
     """Machines whose end effectors hold an object where they are."""
     name, _, touch = hold.partition(":")
+    from ..exchange.contacts.grasping import held_by
     from ..machine.description.contact import as_contact
 
-    contact, joints = as_contact("--hold", touch or "flat"), []
-    middle = sum(part.home_pose[:3, 3] for part in parts) / len(parts)
-    for part in parts:
-        frame = part.home_pose
-        hand = part.end_effector_body
-        joints.append(contact.joint(f"{hand}_{name}", (hand, name), frame, frame[:3, 2]))
-    return pf.join(*parts, joints=joints, end_effector=name, reference_point=middle, task=task)
+    contact = as_contact("--hold", touch or "flat")
+    return held_by(parts, name, [(part.home_pose, contact) for part in parts], None, task, None)
 
 
 def _pose(given: str | None) -> Any:

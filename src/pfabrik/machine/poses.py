@@ -142,11 +142,14 @@ def as_poses(target: Any) -> tuple[Floats, tuple[int, ...]]:
 
 def one_pose(name: str, value: Any) -> Floats:
     """An argument that is one pose (4, 4), or a position (3,) without a turn, made exact; else InvalidArgument."""
-    poses, batch = as_poses(value)
+    try:
+        poses, batch = as_poses(value)
+    except InvalidArgument as error:
+        raise InvalidArgument(name, error.found, "a pose of shape (4, 4), or a position of shape (3,)") from None
     if batch:
         raise InvalidArgument(name, f"shape {np.shape(value)}", "one pose of shape (4, 4), or a position of shape (3,)")
     if not are_poses(poses)[0]:
-        raise InvalidArgument(name, what_is_wrong(poses[0]), "a pose of shape (4, 4)")
+        raise InvalidArgument(name, what_is_wrong(poses[0]), "a pose of shape (4, 4), or a position of shape (3,)")
     return np.asarray(made_exact(poses)[0])
 
 

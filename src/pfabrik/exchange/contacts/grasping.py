@@ -42,8 +42,9 @@ def grasp(
         What the object is to be called.
     holds : mapping of str to tuple
         Name -> an arm, where it stands (`Mechanism.at`), and how its end effector holds: a contact as in `stand`, in
-        the frame of the hand, which is unturned at home, with the arm as it is at home; or a pose (4, 4) of the hand
-        in the frame of the object, to which the arm is moved, and which holds as "flat"; or such a pose and a contact.
+        the frame of the hand, which at home has no turn wherever the arm stands, with the arm as it is at home; or a
+        pose (4, 4) of the hand in the frame of the object, to which the arm is moved, and which holds as "flat"; or
+        such a pose and a contact.
     at : array (4, 4) or (3,), optional
         The object at home, in base coordinates [length]: its frame, whose origin targets place. Default: the middle of
         the contacts, unturned.
@@ -59,20 +60,44 @@ def grasp(
     InvalidMechanism
         What comes out is no mechanism, with every fault.
     """
-    require_type("object", object, str, "a name")
-    if not require_mapping("holds", holds, "arms and grasps by name"):
+    for each in (object, *require_mapping("holds", holds, "arms and grasps by name")):
+        require_type("object" if each is object else "holds", each, str, "a name")
+    if not holds:
         raise InvalidArgument("holds", "none", "an arm and how it holds, by name")
     place = None if at is None else one_pose("at", at)
-    arms, joints, points = [], [], []
-    for each, held in holds.items():
-        arm, frame, contact = _held(f"holds['{each}']", held, place)
-        arms.append(arm.at((0.0, 0.0, 0.0), prefix=f"{each}_"))
-        touching = (arms[-1].end_effector_body, object)
-        joints.append(contact.joint(f"{each}_{object}", touching, frame, frame[:3, 2]))
-        points.append(frame[:3, :3] @ contact.at + frame[:3, 3])
-    reference = np.mean(points, axis=0) if place is None else place[:3, 3]
+    held = {each: _held(f"holds['{each}']", grip, place) for each, grip in holds.items()}
+    base = next(iter(held.values()))[0].base
+    arms = [arm.at((0.0, 0.0, 0.0), prefix=f"{each}_", base=base) for each, (arm, _, _) in held.items()]
     called = f"{object} held by {', '.join(holds)}" if name is None else name
-    return join(*arms, joints=joints, end_effector=object, reference_point=reference, task=task, name=called)
+    contacts = [(frame, contact) for _, frame, contact in held.values()]
+    return held_by(arms, object, contacts, None if place is None else place[:3, 3], task, called)
+
+
+def held_by(
+    arms: Sequence[Mechanism],
+    held: str,
+    contacts: Sequence[tuple[Floats, Contact]],
+    reference: Floats | None,
+    task: Sequence[str] | None,
+    name: str | None,
+) -> Mechanism:
+    """Machines whose end effectors touch one body, which is new.
+
+    Parameters
+    ----------
+    contacts : the frame (4, 4) of each end effector where it touches, and how.
+    reference : the point of the body that targets place, (3,); None for the middle of the contacts.
+    """
+    if any(held in (*arm.bodies, arm.base) for arm in arms):
+        raise InvalidArgument("object", f"'{held}', which is a body of a machine", "a name of its own")
+    hands = [arm.end_effector_body for arm in arms]
+    joints = [
+        contact.joint(f"{hand}_{held}", (hand, held), frame, frame[:3, 2])
+        for hand, (frame, contact) in zip(hands, contacts, strict=True)
+    ]
+    points = [frame[:3, :3] @ contact.at + frame[:3, 3] for frame, contact in contacts]
+    middle = np.mean(points, axis=0) if reference is None else reference
+    return join(*arms, joints=joints, end_effector=held, reference_point=middle, task=task, name=name)
 
 
 def _held(argument: str, held: Any, place: Floats | None) -> tuple[Mechanism, Floats, Contact]:

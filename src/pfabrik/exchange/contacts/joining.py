@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from numpy.typing import ArrayLike
 
 from ...common.checks import require_type
-from ...errors import InvalidArgument
+from ...errors import InvalidArgument, UnknownName
 from ...machine.description.form_faults import shown
 from ...machine.description.joints import Joint
 from ...machine.description.mechanism import Mechanism, checked_mechanism
@@ -24,8 +24,8 @@ def join(
 ) -> Mechanism:
     """Machines as one mechanism, on the base of the first.
 
-    A machine stands on that base too, unless its own is called, by `Mechanism.at`, as a body of another machine: then
-    on this. What else holds them together, such as hands on a box, are `joints`.
+    Bodies of one name are one body: a machine stands on the base of the first where its own has that name, or on the
+    body of another machine that `Mechanism.at` calls its base. What else holds them together are `joints`.
 
     Parameters
     ----------
@@ -46,6 +46,8 @@ def join(
     ------
     InvalidArgument
         No machine, other units of length, or a body that two machines have and that is the base of neither.
+    UnknownName
+        A base that is no body of another machine.
     InvalidMechanism
         What they make is none, with every fault.
     """
@@ -56,11 +58,10 @@ def join(
     for machine in machines:
         if checked_mechanism(machine).length_unit != first.length_unit:
             raise InvalidArgument("machines", f"lengths in {machine.length_unit} and {first.length_unit}", "one unit")
-    carriers = {body for machine in machines for body in machine.bodies if body != machine.base}
-    machines = tuple(
-        each if each.base in carriers or each.base == first.base else each.at((0.0, 0.0, 0.0), base=first.base)
-        for each in machines
-    )
+    carriers = {body for machine in machines for body in machine.bodies if body != machine.base} | {first.base}
+    for machine in machines:
+        if machine.base not in carriers:
+            raise UnknownName(f"body of another machine under '{machine.name}'", machine.base, sorted(carriers))
     bases = {machine.base for machine in machines}
     counts = Counter(body for machine in machines for body in machine.bodies if body not in bases)
     twice = [body for body, count in counts.items() if count > 1]

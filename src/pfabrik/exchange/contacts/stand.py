@@ -46,13 +46,14 @@ def stand(
     feet : mapping of str to str or sequence of str
         Body, link, site or named geom -> how it touches: "point" (its origin, or the middle of a geom, stays and turns
         freely), "flat" (it stays as it is), "pinned" (it turns about the vertical), or a mapping with `type`, `at`
-        (where, in the part's own frame), and `axis` (of "edge", about which it rolls, or of "pinned"). Names alone
-        are points.
+        (where, in the part's own frame [length of the mechanism]), and `axis` (of "edge", about which it rolls, or of
+        "pinned"). Names alone are points.
     body : str, optional
         The trunk. Default: the body from which the ways to the feet part.
     at : str or array (nq,) or mapping of str to float, optional
         Home: the name of a keyframe or `qpos` of a MuJoCo model; or joint -> its value [rad, m; of a mechanism in its
-        unit]. Default: the keyframe "home" if there is one, else as the file has it.
+        unit], others as by default: the keyframe "home" if there is one, else as the file has it. Joints that are
+        beyond their ranges are moved into them before the feet touch the ground.
     loops : str or PathLike or mapping, optional
         As in `interop.from_urdf`.
     actuated : iterable of str, optional
@@ -69,12 +70,14 @@ def stand(
     Raises
     ------
     InvalidArgument
-        A foot that does not hang on the trunk, or a contact that is none.
+        A foot that is fixed to the trunk, or a contact that is none.
     UnknownName
         A foot, a body, a joint or a keyframe that the robot does not have.
     InvalidMechanism
         As in `interop.from_mjcf`.
     """
+    if not isinstance(robot, str | os.PathLike | Mechanism):
+        raise InvalidArgument("robot", type(robot).__name__, "a path, the text of a model, or a Mechanism")
     shared: dict[str, Any] = {"actuated": actuated, "fixed": fixed, "task": task, "within": within, "feet": feet}
     if isinstance(robot, Mechanism) or _is_own(robot):
         machine = robot if isinstance(robot, Mechanism) else load(robot)

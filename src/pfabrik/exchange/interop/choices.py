@@ -89,6 +89,8 @@ class Choice:
     feet: Mapping[str, ContactType] = field(default_factory=dict)
 
     def __str__(self) -> str:
+        if self.feet and not self.moved:
+            return f"stands on {', '.join(self.feet)}:\n  {self.refusal}"
         if self.feet:
             drives = counted(len(self.moved[0].actuators), "drive")
             freedoms = counted(self.moved[0].freedoms, "freedom")

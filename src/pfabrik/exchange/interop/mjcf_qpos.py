@@ -43,7 +43,7 @@ def qpos(
     configuration : str or array (nq,), optional
         The mechanism's home in that model: "qpos0", the name of a keyframe, or positions. Default: the first of these
         that has the joints where they are at home, else "qpos0". A body that floats freely in the model is put where
-        the mechanism has it.
+        the mechanism has it: the world is then what the mechanism's base coordinates are.
 
     Raises
     ------

@@ -82,7 +82,7 @@ def from_mjcf(
     fixed : iterable of str, optional
         Names of joints to hold where they are.
     configuration : str or array (nq,) or mapping of str to float, optional
-        Home: "qpos0", the name of a keyframe, MuJoCo's `qpos`, or joint -> its value [rad, m], others as in `qpos0`.
+        Home: "qpos0", the name of a keyframe, MuJoCo's `qpos`, or joint -> its value [rad, m], others as by default.
         Default: "qpos0"; with `feet` the keyframe "home", if there is one.
     length_unit : str, optional
         The unit of the mechanism: "mm", "m", ...; a model has metres.
@@ -124,7 +124,7 @@ def from_mjcf(
         values = configuration if isinstance(configuration, Mapping) else {}
         keys = [key.get("name") for key in root.iterfind("keyframe/key")]
         home = "home" if feet is not None and "home" in keys else "qpos0"
-        named = home if configuration is None else "qpos0" if isinstance(configuration, Mapping) else configuration
+        named = home if configuration is None or isinstance(configuration, Mapping) else configuration
         model = MjcfModel(plain, named)
         robot = posed(_robot(root, model, notes), values)
         held = [*require_names("fixed", fixed), *model.held(notes)]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ...common.arrays import Floats
 from ...common.checks import require_mapping
-from ...machine.description.joints import DRIVE_FIELDS
+from ...errors import InvalidArgument
+from ...kinematics import tree_of
+from ...machine.description.joints import DRIVE_FIELDS, Joint
 from ...machine.description.mechanism import Mechanism
 from .collision import Collision, Solid
 from .driving import Rates
@@ -30,9 +33,14 @@ def mechanism_on_feet(
 
 
 def _as_robot(mechanism: Mechanism) -> Robot:
-    """The mechanism as a robot whose metres are its own unit."""
+    """The mechanism, a tree, as a robot whose metres are its own unit."""
+    tree = tree_of(mechanism)
+    if tree.closing:
+        found = f"'{mechanism.name}', whose loops are closed already"
+        raise InvalidArgument("robot", found, "a robot whose joints are a tree")
+    outward = [_outward(mechanism.joints[index], is_forward) for index, is_forward in tree.steps]
     places: dict[str, tuple[str, Floats]] = {body: (body, np.eye(4)) for body in mechanism.bodies}
-    for joint in mechanism.joints:  # a body that ends a chain is where its joint is, as links of robots are
+    for joint in outward:  # a body that ends a chain is where its joint is, as links of robots are
         if joint.at is not None:
             frame = np.eye(4)
             frame[:3, 3] = joint.at
@@ -41,7 +49,7 @@ def _as_robot(mechanism: Mechanism) -> Robot:
         places[mechanism.end_effector] = mechanism.end_effector, np.asarray(mechanism.home_pose)
     return Robot(
         mechanism.name,
-        mechanism.joints,
+        outward,
         (),
         mechanism.base,
         places,
@@ -54,3 +62,14 @@ def _as_robot(mechanism: Mechanism) -> Robot:
             masses=mechanism.masses,
         ),
     )
+
+
+def _outward(joint: Joint, is_forward: bool) -> Joint:
+    """A joint from the body nearer to the base; one that says otherwise counts alike about a turned axis."""
+    first, second = joint.connects
+    if is_forward:
+        return joint
+    if joint.axis is None and joint.type not in ("fixed", "spherical"):
+        raise InvalidArgument("robot", f"joint '{joint.name}' inward, from '{first}'", "joints from the base outward")
+    x, y, z = joint.axis or (0.0, 0.0, 0.0)
+    return replace(joint, connects=(second, first), axis=None if joint.axis is None else (-x, -y, -z))

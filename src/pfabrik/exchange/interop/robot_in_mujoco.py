@@ -20,10 +20,13 @@ from ...machine.description.mechanism import Mechanism
 from ...machine.files.units import metres_of
 from ...tolerances import TOLERANCES
 from .mjcf_bodies import si_unit
-from .mjcf_model import CLOSED, NEWTON_STEPS, SAME_ROW, CompiledModel
+from .mjcf_model import CLOSED, NEWTON_STEPS, SAME_ROW, CompiledModel, frame_of
 
 AT_REST = 1e-13
 """Step that is none [m or rad]."""
+
+SAME_PLACE = 1e-3
+"""How far joints may be from where the mechanism has them [L]: digits of another file of the same robot."""
 
 STILL = 1e-12
 """Slope of a row below which it does not move with a joint: rounding of the poses of bodies in between."""
@@ -64,6 +67,7 @@ class RobotInMujoco(CompiledModel):
         self._places: dict[int, int] = {}
         self._balls: dict[int, tuple[slice, int]] = {}
         self._floating: dict[int, str] = {}
+        self._afloat: dict[int, Floats] = {}
         self._match()
         self._require_joints()
         self.put_configuration(self._home_in_model() if configuration is None else configuration)
@@ -80,7 +84,10 @@ class RobotInMujoco(CompiledModel):
         """Take the mechanism's home, closed, from which its balls turn."""
         self.take(self.begin)
         self._homes = {joint: (np.eye(3), self._quaternion(joint).copy()) for joint in self._balls}
-        self.put(np.array([each.home for each in self.mechanism.coordinates]))
+        home = np.array([each.home for each in self.mechanism.coordinates])
+        self.put(home)
+        self._afloat = {joint: self._home_afloat(joint) for joint in self._floating}
+        self.put(home)
         self.close()
         self._homes = {joint: (self._frame_before(joint), self._quaternion(joint).copy()) for joint in self._balls}
 
@@ -177,9 +184,11 @@ class RobotInMujoco(CompiledModel):
             self._places |= {spans[name].start: address + place for place, name in enumerate(slides)}
             self._balls[joint] = spans[ball.name], address + len(slides)
         for joint in np.flatnonzero(self.model.jnt_type == kinds.mjJNT_FREE).tolist():
-            body = self.model.body(self.model.jnt_bodyid[joint]).name
-            if joint not in self._balls and body in self.mechanism.bodies:
-                self._floating[joint] = body
+            welded = np.flatnonzero(self.model.body_weldid == self.model.jnt_bodyid[joint])
+            bodies = [str(self.model.body(index).name) for index in welded]
+            afloat = next((body for body in bodies if body in self.mechanism.bodies), None)
+            if joint not in self._balls and afloat is not None:
+                self._floating[joint] = afloat
 
     def _home_in_model(self) -> str:
         """The first configuration of the model whose joints have the mechanism's values at home, else "qpos0"."""
@@ -192,18 +201,43 @@ class RobotInMujoco(CompiledModel):
         return "qpos0"
 
     def _float(self, q: Floats) -> None:
-        """Put what floats freely, of which the mechanism has the body and not the joint, where it has it."""
-        if not self._floating:
+        """Put what floats freely, of which the mechanism has the body and not the joint, where it has it.
+
+        The world is what the mechanism's base coordinates are.
+        """
+        if not self._afloat:
             return
         moved = displacements(self.mechanism, (q - home_coordinates(self.mechanism))[None])
-        for joint, body in self._floating.items():
-            address, motion = int(self.model.jnt_qposadr[joint]), moved[body][0]
-            at, turn = self.begin[address : address + 3], np.empty(4)
-            self.mujoco.mju_mat2Quat(turn, np.ascontiguousarray(motion[:3, :3]).ravel())
-            self.data.qpos[address : address + 3] = motion[:3, :3] @ at + motion[:3, 3] * self.metres
-            self.mujoco.mju_mulQuat(
-                self.data.qpos[address + 3 : address + 7], turn, self.begin[address + 3 : address + 7]
-            )
+        for joint, home in self._afloat.items():
+            address, motion = int(self.model.jnt_qposadr[joint]), moved[self._floating[joint]][0].copy()
+            motion[:3, 3] *= self.metres
+            pose = motion @ home
+            self.data.qpos[address : address + 3] = pose[:3, 3]
+            turn = np.ascontiguousarray(pose[:3, :3]).ravel()
+            self.mujoco.mju_mat2Quat(self.data.qpos[address + 3 : address + 7], turn)
+
+    def _home_afloat(self, joint: int) -> Floats:
+        """The pose (4, 4) at home of a body that floats, in base coordinates [m], by the joints that are on it."""
+        root, here, there = self.model.body_rootid[self.model.jnt_bodyid[joint]], [], []
+        for index, column in self._scalars.items():
+            own = self.mechanism.coordinates[column].joint
+            if own.at is None or own.axis is None or self.model.body_rootid[self.model.jnt_bodyid[index]] != root:
+                continue
+            at = np.array(own.at) * self.metres
+            here += [at, at + self._size * np.array(own.axis)]
+            there += [self.data.xanchor[index], self.data.xanchor[index] + self._size * self.data.xaxis[index]]
+        place = int(self.model.jnt_bodyid[joint])
+        frame = frame_of(self.data.xpos[place], self.data.xmat[place])
+        if not here:
+            return frame
+        middle, other = np.mean(here, axis=0), np.mean(there, axis=0)
+        left, _, right = np.linalg.svd((np.array(here) - middle).T @ (np.array(there) - other))
+        turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+        off = np.abs((np.array(there) - other) @ turn.T + middle - here).max()
+        if not off <= SAME_PLACE * self._size:
+            found = f"joints that are up to {off:.3g} m away from where the mechanism has them at home"
+            raise InvalidArgument("model", found, "the robot that the mechanism was made of")
+        return frame_of(middle - turn @ other, turn) @ frame
 
     def _require_joints(self) -> None:
         """Stop where a joint has no counterpart, unless it may be one that closes a loop, or holds what else floats."""

@@ -62,7 +62,9 @@ def mechanism_of(
     if asked.feet is not None:
         if base is not None:
             raise InvalidArgument("base", repr(base), "none beside `feet`, which are on the ground")
-        robot, end_effector = standing(robot, as_contacts("feet", asked.feet), end_effector, notes), None
+        metres = metres_of(asked.length_unit)
+        feet = {name: each.scaled(metres) for name, each in as_contacts("feet", asked.feet).items()}
+        robot, end_effector = standing(robot, feet, end_effector, notes), None
     base = _base(robot, base)
     end_effector = _end_effector(robot, end_effector, base)
     if asked.task is not None:
@@ -217,13 +219,16 @@ def _end_effector(robot: Robot, end_effector: str | None, base: str) -> str:
 def _stances(robot: Robot) -> Iterator[Choice]:
     """The robot on its feet, where it has some."""
     feet = feet_of(robot)
-    with suppress(PfabrikError):
-        if feet:
-            plain = dataclasses.replace(standing(robot, as_contacts("feet", feet), None, []), collision=NO_COLLISION)
-            base, trunk = _base(plain, None), _end_effector(plain, None, "")
-            machine = _between(plain, base, trunk, ImportOptions(), []).mechanism
-            moved = Moved(trunk, generic_of(machine).mobility.platform, 0, machine.actuator_names)
-            yield Choice(base, (), trunk, None, (moved,), feet=feet)
+    if not feet:
+        return
+    try:
+        plain = dataclasses.replace(standing(robot, as_contacts("feet", feet), None, []), collision=NO_COLLISION)
+        base, trunk = _base(plain, None), _end_effector(plain, None, "")
+        machine = _between(plain, base, trunk, ImportOptions(), []).mechanism
+        moved = Moved(trunk, generic_of(machine).mobility.platform, 0, machine.actuator_names)
+        yield Choice(base, (), trunk, None, (moved,), feet=feet)
+    except PfabrikError as error:
+        yield Choice(robot.root, feet=feet, refusal=f"refused: {str(error).splitlines()[0]}")
 
 
 def _place(robot: Robot, end_effector: str) -> tuple[str, Floats | None]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ...common.arrays import Floats
-from ...common.checks import require_known
+from ...common.checks import require_finite, require_known
 from ...errors import InvalidArgument
 from ...kinematics import columns
 from ...machine.description.contact import Contact, ContactType
@@ -31,6 +31,12 @@ SAME_HEIGHT = 0.1
 """Share of a robot's height by which feet may be higher than its lowest one: by which they are told from hands."""
 
 
+WORLD = "world"
+"""The root of MuJoCo's models, and of descriptions that have one: the ground itself."""
+
+LEAST_AFLOAT = 3
+"""Freedoms of what floats, at least: in a plane."""
+
 LEAST_DRIVES, WHOLE = 2, 6
 """Drives of the least limb that is a leg, and of one that places all of its foot."""
 
@@ -42,6 +48,7 @@ def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
     tree = Structure(robot.name, tuple(robot.joints), robot.root, (0.0, 0.0, 0.0), robot.root, "m")
     scalar = [each.name for each in tree.coordinates if each.joint.name == each.name]
     require_known("joint", values, scalar)
+    values = {name: require_finite(f"the value of joint '{name}'", value) for name, value in values.items()}
     q = np.zeros(len(tree.coordinates))
     for name, value in _followed(values, robot.couplings).items():
         q[columns(tree)[name]] = value - np.ravel(tree.home_coordinate(name))[0]
@@ -81,29 +88,29 @@ def standing(robot: Robot, feet: Mapping[str, Contact], body: str | None, notes:
 
     Parameters
     ----------
-    feet : body, site, or named geom -> how it touches.
+    feet : body, site, or named geom -> how it touches, lengths in metres.
     body : the trunk; None for the body from which the ways to the feet part.
     """
-    places = _touching(robot)
-    require_known("body, site or geom to stand on", feet, places)
-    above = {joint.connects[1]: joint for joint in robot.joints}
+    require_known("body, site or geom to stand on", feet, _touching(robot))
+    robot = _within_ranges(robot, notes)
+    places, above = _touching(robot), {joint.connects[1]: joint for joint in robot.joints}
     ways = {foot: _way(places[foot][0], above) for foot in feet}
-    trunk = _trunk(robot, ways) if body is None else body
+    trunk = _trunk(ways) if body is None else body
     require_known("body", [trunk], robot.places)
     end = robot.places[trunk][0]
+    stands_for = merged_bodies(robot.joints, robot.root)[1]
     for foot, way in ways.items():
-        if end not in way or end == way[0]:
-            raise InvalidArgument(
-                "feet", f"'{foot}', which does not hang on '{trunk}'", f"parts that move against '{trunk}'"
-            )
-    holding = {above[each].name for each in _way(end, above) if each in above}
+        if stands_for.get(way[0], way[0]) in (stands_for.get(end, end), WORLD):
+            raise InvalidArgument("feet", f"'{foot}', which is fixed to '{trunk}'", f"what moves against '{trunk}'")
     taken = {*(joint.name for joint in robot.joints), *(loop.name for loop in robot.loops), *robot.places}
-    base = unique("ground", set(robot.places)) if end == robot.root else robot.root
+    base = WORLD if robot.root == WORLD else unique("ground", {*robot.places, robot.root})
     contacts = [
         contact.joint(unique(f"{foot}_contact", taken), (base, places[foot][0]), places[foot][1], UP)
         for foot, contact in feet.items()
     ]
-    legs = [above[each].name for way in ways.values() for each in way[: way.index(end)]]
+    between = [{*way} ^ {*_way(end, above)} for way in ways.values()]
+    legs = [above[each].name for way in between for each in way if each in above]
+    holding = {name for way in (*ways.values(), _way(end, above)) for name in _holding(robot, way, above)}
     joints = [joint for joint in robot.joints if joint.name not in holding]
     if not any(joint.driven for joint in joints if joint.name in legs):
         joints, drives = _driven(joints, legs, {each.follower for each in robot.couplings})
@@ -119,6 +126,33 @@ def standing(robot: Robot, feet: Mapping[str, Contact], body: str | None, notes:
         places={base: (base, np.eye(4))} | dict(robot.places),
         roundings={**robot.roundings, **exact} if robot.roundings else {},
     )
+
+
+def _within_ranges(robot: Robot, notes: list[Note]) -> Robot:
+    """The robot with joints that are beyond their ranges at the nearest ends, before its feet touch the ground."""
+    moved: dict[str, float] = {}
+    for joint in robot.joints:
+        if joint.range is not None and joint.type in ("revolute", "prismatic"):
+            (low, high), value = np.ravel(joint.range).tolist(), float(np.ravel(joint.home)[0])
+            if not low <= value <= high:
+                moved[joint.name] = min(max(value, low), high)
+    note_names(notes, "home was outside the range, and is moved into it", moved)
+    return posed(robot, moved)
+
+
+def _holding(robot: Robot, way: Sequence[str], above: Mapping[str, Joint]) -> Iterator[str]:
+    """Yield the joints that hold the robot, or let it float, above its first body.
+
+    They are those of the world; of another root those that let the robot float, where the root weighs nothing: any
+    other is a part of it.
+    """
+    masses = {each.body for each in robot.collision.masses if each.mass > 0.0}
+    first = next((place for place in range(len(way) - 2, -1, -1) if way[place] in robot.places), -1)
+    joints = [above[each] for each in way[first:-1]] if first >= 0 and way[-1] == robot.root else []
+    is_afloat = sum(len(KINDS[joint.type].coordinates) for joint in joints) >= LEAST_AFLOAT
+    is_afloat &= not any(joint.driven or joint.range for joint in joints)
+    if robot.root == WORLD or (is_afloat and robot.root not in masses):
+        yield from (joint.name for joint in joints)
 
 
 def feet_of(robot: Robot) -> dict[str, ContactType]:
@@ -166,15 +200,13 @@ def _way(body: str, above: Mapping[str, Joint]) -> list[str]:
     return way
 
 
-def _trunk(robot: Robot, ways: Mapping[str, list[str]]) -> str:
-    """The body from which the ways to the feet part; of those welded to it the one nearest to the root."""
-    shared = set.intersection(*map(set, ways.values()))
+def _trunk(ways: Mapping[str, Sequence[str]]) -> str:
+    """The body from which the ways to the feet part."""
+    shared = set.intersection(*map(set, ways.values())) - {WORLD}
     trunk = next((each for each in next(iter(ways.values())) if each in shared), None)
     if len(ways) < 2 or trunk is None:
         raise InvalidArgument("body", "none", "the body to be moved over the feet (--end-effector)")
-    stands_for = merged_bodies(robot.joints, robot.root)[1]
-    rigid = stands_for.get(trunk, trunk)
-    return rigid if rigid != robot.root or trunk == robot.root else trunk
+    return trunk
 
 
 def _driven(joints: list[Joint], legs: list[str], following: set[str]) -> tuple[list[Joint], list[str]]:

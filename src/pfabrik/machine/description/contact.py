@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any, Literal, NamedTuple, TypeAlias, TypedDict
 
 import numpy as np
@@ -47,6 +47,10 @@ class Contact(NamedTuple):
     at: Floats
     axis: Floats | None
 
+    def scaled(self, factor: float) -> Contact:
+        """The contact with lengths in another unit."""
+        return self._replace(at=factor * self.at)
+
     def joint(self, name: str, connects: tuple[str, str], frame: Floats, normal: Floats) -> Joint:
         """The joint that it is.
 
@@ -86,8 +90,9 @@ def as_contact(argument: str, given: Any) -> Contact:
 
 def as_contacts(argument: str, given: Any, default: ContactType = "point") -> dict[str, Contact]:
     """Contacts by the names of parts: of a list of names, all as the default."""
-    if isinstance(given, Sequence) and not isinstance(given, str | bytes):
-        given = dict.fromkeys(given, default) if all(isinstance(each, str) for each in given) else given
+    if isinstance(given, Iterable) and not isinstance(given, str | bytes | Mapping):
+        names = list(given)
+        given = dict.fromkeys(names, default) if all(isinstance(each, str) for each in names) else names
     if not isinstance(given, Mapping) or not given:
         raise InvalidArgument(argument, shown(given), "contacts by the names of what touches, such as {'FL': 'point'}")
     return {name: as_contact(f"{argument}['{name}']", value) for name, value in given.items()}
