@@ -166,8 +166,11 @@ class Solver:
         twist, acceleration : array (6,) or (3,), optional
             Velocity and acceleration of the reference point, then angular ones, in the base frame [length/s, rad/s; per
             s]; at rest by default. Arrays (6,) of float64 are the fastest.
-        loads, gravity : optional
-            As in `inverse_dynamics`; what changes from call to call is prepared anew, in about a millisecond.
+        loads : mapping of str to tuple, optional
+            What bodies carry, as in `inverse_dynamics`; what changes from call to call is prepared anew, in about a
+            millisecond.
+        gravity : array (3,), optional
+            Gravity [m/s²], likewise.
 
         Raises
         ------

@@ -24,8 +24,9 @@ ZOOMS = 3
 
 CELLS_A_BLOCK = 2000
 
-SAME = 1e-12
-"""Difference of squared speeds, by the largest, up to which two timings are the same."""
+SAME = 1e-5
+"""Difference of squared speeds, and of s'', by the largest, up to which two timings are the same in a cell: torques
+change by about as much of their limits, a hundredth of what is told."""
 
 SPLINED, DOUBLINGS = 1e-4, 10
 """Share of a limit of torque up to which splines are exact: a tenth of what is told; and how often their places are
@@ -177,7 +178,9 @@ def cells_over(curve: Curve, timing: Timing, limits: Limits, before: Timing | No
     if before is not None:  # x is straight between points
         differs = np.abs(np.interp(timing.s, before.s, before.x) - timing.x) > SAME * timing.x.max()
         differs |= ~np.isin(timing.s, before.s)
-        looked_at = differs[1:] | differs[:-1]
+        pushes = before.through(0.5 * (timing.s[1:] + timing.s[:-1]))[1]
+        looked_at = np.abs(pushes - timing.pushes) > SAME * np.abs(timing.pushes).max()
+        looked_at |= differs[1:] | differs[:-1]
     for cells in _blocks(np.flatnonzero(looked_at)):
         over[cells] = (_used(curve, timing, limits, cells, LOOKS) > 1.0 + 0.5 * EXCEEDED).any(axis=(1, 2))
     return over
@@ -187,15 +190,17 @@ def _blocks(cells: Ints) -> list[Ints]:
     return np.split(cells, range(CELLS_A_BLOCK, len(cells), CELLS_A_BLOCK)) if len(cells) else []
 
 
-def exceeded(curve: Curve, timing: Timing, limits: Limits, actuators: tuple[str, ...]) -> tuple[Exceeded, ...]:
-    """The limits that a motion exceeds, anywhere, the most first."""
+def exceeded(
+    curve: Curve, timing: Timing, limits: Limits, actuators: tuple[str, ...], over: Mask
+) -> tuple[Exceeded, ...]:
+    """The limits that a motion exceeds, anywhere, the most first; `over` is of `cells_over`."""
     named = limits.named(actuators)
     found: dict[int, Exceeded] = {}
     durations = np.zeros(len(named))
     signs = np.sign(curve.at(timing.s, 1)[:, : curve.n_actuators])
     rubs = False if limits.path is None else limits.path.rubs
     turns_back = ((signs[1:] != signs[:-1]) & rubs).any(axis=1)
-    for cells in _blocks(np.flatnonzero(cells_over(curve, timing, limits) | turns_back)):
+    for cells in _blocks(np.flatnonzero(over | turns_back)):
         used = _used(curve, timing, limits, cells, CLOSER_LOOKS)
         durations += (used > 1.0 + EXCEEDED).mean(axis=1).T @ timing.durations[cells]
         for place in np.flatnonzero(used.max(axis=(0, 1)) > 1.0 + 0.5 * EXCEEDED).tolist():

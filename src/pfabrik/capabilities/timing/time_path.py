@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ...answers.solution import Solution
 from ...answers.tracked import Track, refuse_leaps
 from ...common.arguments import array, is_not_negative
-from ...common.arrays import Floats
+from ...common.arrays import Floats, Mask
 from ...common.checks import require_positive, require_type
 from ...errors import InvalidArgument
 from ...fk import solve_fk
@@ -134,8 +134,7 @@ def time_path(
         refuse_swings(track, curve)
         by_torque = _torques(track, curve, torques, loads, gravity)
         limits = Limits(speeds, accelerations, most_platform, torques, by_torque, _twists(track, curve, most_twist))
-        timing, limits = _fastest(curve, limits)
-        parts.append((pause, _sampled(track, curve, timing, limits, every)))
+        parts.append((pause, _sampled(track, curve, *_fastest(curve, limits), every)))
         pause = 0.0
     if not parts:
         raise InvalidArgument("track", "a path that does not move", "two steps or more that differ")
@@ -200,21 +199,22 @@ def refuse_swings(track: Track, curve: Curve) -> None:
         raise InvalidArgument("track", found, "shorter steps, or some room before that limit", rows=steps)
 
 
-def _fastest(curve: Curve, limits: Limits) -> tuple[Timing, Limits]:
-    """The fastest timing on a grid that is as fine as its limits need it, and these, exact where it is."""
-    s, before = curve.grid(), None
+def _fastest(curve: Curve, limits: Limits) -> tuple[Timing, Limits, Mask]:
+    """The fastest timing on a grid as fine as its limits need it; these, exact where it is, and `cells_over`."""
+    s = curve.grid()
     timing = _fastest_on(s, curve, limits)
     if limits.path is None and limits.twists is None:
-        return timing, limits
+        return timing, limits, cells_over(curve, timing, limits)
     limits = with_exact_splines(curve, timing, limits)
+    over = cells_over(curve, timing, limits)
     for _ in range(REFINEMENTS):
-        over = cells_over(curve, timing, limits, before)
         if not over.any():
             break
         over[1:-1] |= over[2:] | over[:-2]
         s, before = np.sort(np.append(s, 0.5 * (s[1:] + s[:-1])[over])), timing
         timing = _fastest_on(s, curve, limits)
-    return timing, limits
+        over = cells_over(curve, timing, limits, before)
+    return timing, limits, over
 
 
 def _fastest_on(s: Floats, curve: Curve, limits: Limits) -> Timing:
@@ -276,7 +276,7 @@ def _refuse_heavy(curve: Curve, s: Floats, parts: TorqueParts, path: TorquePath)
         raise InvalidArgument("torque", found, "limits that hold the machine, dry friction included", rows=steps)
 
 
-def _sampled(track: Track, curve: Curve, timing: Timing, limits: Limits, every: float) -> Timed:
+def _sampled(track: Track, curve: Curve, timing: Timing, limits: Limits, over: Mask, every: float) -> Timed:
     """Samples at a rate, and at the very end."""
     reached, names = timing.reached, track.mechanism.actuator_names
     if reached[-1] / every > MOST_SAMPLES:
@@ -300,6 +300,6 @@ def _sampled(track: Track, curve: Curve, timing: Timing, limits: Limits, every: 
         used=sampled.used.max(axis=1),
         binding=sampled.used.argmax(axis=1),
         limits=limits.named(names),
-        exceeded=exceeded(curve, timing, limits, names),
+        exceeded=exceeded(curve, timing, limits, names, over),
         _track=track,
     )
