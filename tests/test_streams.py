@@ -175,19 +175,18 @@ def two_arms() -> Mechanism:
 
 
 def test_two_arms_follow_a_stream_out_of_reach_and_back() -> None:
-    """Every answer is closed within limits, none costs more than the one before, and finer steps are shorter."""
+    """Every answer is closed within limits and costs no more than to stay; what a drive leaps is told."""
     machine = two_arms()
-    ticks, farthest = 20 if INTERPRETED else 300, []
-    for n in (ticks, 2 * ticks):
-        targets = smooth(machine, n)
-        answers = stream(machine, targets)
-        farthest.append(steps(machine, answers).max())
-        assert max(pf.closure_residual(each) for each in answers) <= 1e-9 * machine.characteristic_length
-        assert max(each.limit_excess for each in answers) <= 1e-9
-        for before, after, target in zip(answers, answers[1:], targets[1:], strict=False):
-            if after.status is Status.PROJECTED:
-                off = float(np.linalg.norm(before.pose[:3, 3] - target[:3, 3]))
-                turn = Rotation.from_matrix(before.pose[:3, :3].T @ target[:3, :3]).magnitude()
-                stayed = cost_of(machine, off, turn, PRICE)
-                assert cost(machine, after, PRICE) <= stayed + 1e-9
-    assert farthest[1] <= 0.76 * farthest[0] or INTERPRETED
+    targets = smooth(machine, 20 if INTERPRETED else 600)
+    answers = stream(machine, targets)
+    far = steps(machine, answers)
+    assert max(pf.closure_residual(each) for each in answers) <= 1e-9 * machine.characteristic_length
+    assert max(each.limit_excess for each in answers) <= 1e-9
+    for before, after, target in zip(answers, answers[1:], targets[1:], strict=False):
+        if after.status is Status.PROJECTED:
+            off = float(np.linalg.norm(before.pose[:3, 3] - target[:3, 3]))
+            turn = Rotation.from_matrix(before.pose[:3, :3].T @ target[:3, :3]).magnitude()
+            assert cost(machine, after, PRICE) <= cost_of(machine, off, turn, PRICE) + 1e-9
+    leaps = np.flatnonzero(far > 1.0)
+    assert INTERPRETED or (len(leaps) <= 2 and all(answers[k + 1].jumped for k in leaps))
+    assert INTERPRETED or np.quantile(far, 0.99) <= 0.3

@@ -18,7 +18,7 @@ PROGRESS = 0.9
 
 # Closing on a target (`close_on_target`)
 
-PATIENCE = 4
+PATIENCE = 8
 """Steps in a row without progress that end a closing where a descent follows: from there that finds what is left."""
 
 STRANGE = 0.1
