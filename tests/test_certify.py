@@ -307,6 +307,10 @@ def test_the_largest_box_is_proved_and_a_larger_one_is_not() -> None:
     assert found.certificate and found.certificate.replay()
     half = 0.5 * 1.02 * found.extents
     assert not pf.certify(machine, PoseRegion.box(found.centre - half, found.centre + half))
+    tripod = pf.load("rps")
+    tall = pf.largest(tripod, "box", centre=tripod.home_pose[:3, 3], extents=[0, 0, 40], tilt=0.2, accuracy=0.01)
+    assert tall.certificate and tall.certificate.replay()
+    assert not pf.certify(tripod, tilts(tripod, 0.5 * 1.02 * tall.extents[2])(0.2))
     ball = pf.largest(pf.load("stewart"), "ball", centre=CENTRE_OF_STEWART, extents=[60, 60, 60], tilt=0.2)
     assert ball.certificate and ball.certificate.region.shape == "ball"
 
