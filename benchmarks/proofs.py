@@ -21,6 +21,13 @@ def proofs(runs: int) -> Iterator[Row]:
         assert pf.certify(hexapod, region).verdict == verdict
         (seconds,) = best_times(runs, lambda region=region: pf.certify(hexapod, region))
         yield Row(f"6-UPS, ±{half:g} mm and ±{degrees:g}° {verdict.lower()}", 1, seconds)
+    tripod, ankle = pf.load("rps"), pf.load("ankle_rss")
+    tilts = pf.PoseRegion.box([0, 0, 183.835], [0, 0, 223.835], tilt=np.radians(20))
+    turns = pf.PoseRegion.joints({"pivot[0]": (-0.23, 0.23), "pivot[1]": (-0.2, 0.2)})
+    for name, machine, region in (("3-RPS, ±20 mm and 20°", tripod, tilts), ("ankle of cranks, pivot", ankle, turns)):
+        assert pf.certify(machine, region)
+        (seconds,) = best_times(runs, lambda machine=machine, region=region: pf.certify(machine, region))
+        yield Row(f"{name} proved", 1, seconds)
     turn = np.linspace(0.0, 2.0 * np.pi, 1001)
     track = pf.track(hexapod, np.stack([30 * np.cos(turn), 30 * np.sin(turn), 210 + 10 * np.sin(3 * turn)], axis=1))
     assert pf.certify(hexapod, track)

@@ -71,9 +71,9 @@ struts = pf.load("struts.toml")
 
 # ## What an ankle must do
 #
-# Pitch by 25° and roll by 15° either way, at once: a region of the pivot's angles. At every such pose hold 60 Nm of pitch
-# with 20 Nm of roll to either side, and turn at 6 rad/s about one with 3 rad/s about the other. Moments are in N mm, as
-# lengths are in mm.
+# Pitch by 25° and roll by 15° either way, at once: a region of the pivot's angles. At every such pose hold 60 Nm of
+# pitch with 20 Nm of roll to either side, and turn at 6 rad/s about one with 3 rad/s about the other. Moments are in N
+# mm, as lengths are in mm.
 tilts = pf.PoseRegion.joints({"Pivot[0]": np.radians([-25, 25]), "Pivot[1]": np.radians([-15, 15])})
 moments = [[0, 0, 0, 20e3, 60e3, 0], [0, 0, 0, -20e3, 60e3, 0]]
 turns = [[0, 0, 0, 3, 6, 0], [0, 0, 0, -3, 6, 0]]
@@ -121,8 +121,8 @@ for kind, found in {"cranks": with_cranks, "struts": with_struts}.items():
 
 # Cranks make the smaller ankle, and a strut's stroke is why: a spindle needs its own length again. `PROVED` says that
 # every pose of the region is reached within all limits. Forces and speeds are kept at many samples, the worst of them
-# looked at more closely. No distance from singularities was asked for, as forces keep one; that the motors hold the foot
-# everywhere is proved afterwards.
+# looked at more closely. No distance from singularities was asked for, as forces keep one; that the motors hold the
+# foot everywhere is proved afterwards.
 for found in (with_cranks, with_struts):
     print(pf.certify(found.mechanism, tilts, singular=True).verdict)
 

@@ -5,8 +5,8 @@ tilts, how strong the actuators are and how much of their length they can push o
 proof. SciPy is needed: `pip install '.[calibrate]'`.
 """
 
-# `pfabrik new 3-RPS` has a tripod whose dimensions we take as the start. Its struts are hinged to the base and carry the
-# table on ball joints.
+# `pfabrik new 3-RPS` has a tripod whose dimensions we take as the start. Its struts are hinged to the base and carry
+# the table on ball joints.
 import subprocess
 import sys
 
@@ -22,8 +22,8 @@ table = pf.load("table.toml")
 # ## What it must do
 #
 # Rise by 20 mm to either side of home and tilt by 15° in any direction at each height. Where a table tilts to, it also
-# shifts and twists a little: that follows from its legs, and the proof follows it. The load is 400 N, up to 60 mm off the
-# middle, and an actuator pushes with 300 N. It is at least 0.6 times as long drawn in as pushed out.
+# shifts and twists a little: that follows from its legs, and the proof follows it. The load is 400 N, up to 60 mm off
+# the middle, and an actuator pushes with 300 N. It is at least 0.6 times as long drawn in as pushed out.
 tilts = pf.PoseRegion.box([0, 0, -20], [0, 0, 20], tilt=np.radians(15))
 load = [[0, 0, -400, 60 * 400 * x, 60 * 400 * y, 0] for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1))]
 vary = {

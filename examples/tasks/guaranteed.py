@@ -76,8 +76,8 @@ ax.figure.savefig("proved.png", dpi=110)
 
 # ## Tilts, and joints' angles
 #
-# Of a tripod the task sets a height and a tilt; where its platform shifts and twists to follows from the legs. `certify`
-# encloses that too. An ankle may be asked in tilts, or in the angles of its pivot.
+# Of a tripod the task sets a height and a tilt; where its platform shifts and twists to follows from the legs.
+# `certify` encloses that too. An ankle may be asked in tilts, or in the angles of its pivot.
 tripod, ankle = pf.load("rps"), pf.load("ankle_rss")
 for degrees in (20, 24):
     tilts = pf.PoseRegion.box([0, 0, 184], [0, 0, 224], tilt=np.radians(degrees))
@@ -85,8 +85,8 @@ for degrees in (20, 24):
 turns = pf.PoseRegion.joints({"pivot[0]": (-0.2, 0.2), "pivot[1]": (-0.15, 0.15)})
 print(pf.certify(ankle, turns).verdict, "in the pivot's angles")
 
-# With `singular=True` it proves too that locked drives hold the platform everywhere: no pose of the region is a parallel
-# singularity.
+# With `singular=True` it proves too that locked drives hold the platform everywhere: no pose of the region is a
+# parallel singularity.
 print(pf.certify(ankle, turns, singular=True))
 
 # ## What has no proof

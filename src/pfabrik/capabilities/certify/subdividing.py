@@ -89,8 +89,8 @@ def region_parameters(
         turning, n, joints = JOINTS, len(region.names), _joints(model, region.path)
         columns = region.path.columns.tolist()
         ranges = np.array([columns.index(c) if c in columns else -1 for c in model.legs.limited["column"]], np.int64)
-    elif follows[3]:
-        turning = ROTATION_VECTOR
+    elif follows[3]:  # a yaw is what is left of a rotation when its tilt is turned back
+        turning = ROTATION_VECTOR if follows[5] else TILT_BOX
     elif follows[5] and turning == ROTATION_VECTOR:
         turning = TILT_BOX
     parameters = CellParameters(

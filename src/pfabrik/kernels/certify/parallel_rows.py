@@ -253,18 +253,21 @@ def put_middle(work: ParallelRows) -> None:
 @routine
 def deviation_of_row(j: int, n: int, work: ParallelRows) -> float:
     """The most that the entries in row `j` of J^-1 times the matrix of a pose, less those of 1, sum up to in size."""
-    inverse, total = work.inverse, 0.0
+    inverse, total, size = work.inverse, 0.0, 0.0
     for c in range(N_ROWS):
         part = -1.0 if c == j else 0.0
         for k in range(N_ROWS):
             entry = work.forces[k, CENTRE, c] if c < 3 else work.moments[k, CENTRE, c - 3]
             error = work.forces[k, BOUNDS, ERROR] if c < 3 else work.moments[k, BOUNDS, ERROR]
             part += inverse[j, k] * entry
-            total += abs(inverse[j, k]) * (error + ROUNDING * abs(entry))
+            total += abs(inverse[j, k]) * error
+            size += abs(inverse[j, k] * entry)
         total += abs(part)
         for i in range(n):
             part = 0.0
             for k in range(N_ROWS):
-                part += inverse[j, k] * (work.forces[k, i, c] if c < 3 else work.moments[k, i, c - 3])
+                entry = work.forces[k, i, c] if c < 3 else work.moments[k, i, c - 3]
+                part += inverse[j, k] * entry
+                size += abs(inverse[j, k] * entry)
             total += abs(part)
-    return total * (1.0 + ROUNDING)
+    return (total + ROUNDING * size) * (1.0 + ROUNDING)
