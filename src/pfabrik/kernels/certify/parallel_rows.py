@@ -2,12 +2,13 @@
 
 Its rows are what the platform's twist (v, w) must not change: f . v + (r x f) . w, with f the rod of a driven leg, the
 hinge that a rod stays across, or a direction that a pivot keeps, and r from the reference point to where it acts. With
-J the matrix in the middle of a cell, J^-1 times that of each pose is 1 + D; if all rows of |D| sum up to less than 1,
-no pose has a singular one.
+J the matrix in the middle of a cell, J^-1 times that of each pose is 1 + D. If |D| <= N, entry by entry, and N w < w
+for some positive w (Collatz, Wielandt), no eigenvalue of D is as large as 1 in size: no pose has a singular matrix.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -31,8 +32,8 @@ from .leg_bounds import put_direction, put_end, put_platform_point, put_proximal
 from .limit_rows import LimitRows
 from .pose_cells import ROUNDING, CellParameters
 
-# Rows of the matrix.
-N_ROWS = 6
+# Rows of the matrix; trials of w, and its least entry, as a share of the largest.
+N_ROWS, TRIALS, LEAST_WEIGHT = 6, 12, 1e-6
 
 
 class ParallelRows(NamedTuple):
@@ -43,18 +44,23 @@ class ParallelRows(NamedTuple):
     lever: Floats  # (8, 3)
     matrix: Floats  # (6, 7)
     inverse: Floats  # (6, 6)
+    bounds: Floats  # (6, 6): N
+    weights: Floats  # (2, 6): w, and N w
     side: Floats  # (1,): 1 if its determinant in the middle has home's sign, -1 if the other one, 0 if it is not known
 
 
 def new_parallel() -> ParallelRows:
     """Allocate the matrix of a machine."""
     forces, moments = np.zeros((N_ROWS, BOUNDS + 1, 3)), np.zeros((N_ROWS, BOUNDS + 1, 3))
+    six = (N_ROWS, N_ROWS)
     return ParallelRows(
         forces,
         moments,
         np.zeros((BOUNDS + 1, 3)),
         np.zeros((N_ROWS, N_ROWS + 1)),
-        np.zeros((N_ROWS, N_ROWS)),
+        np.zeros(six),
+        np.zeros(six),
+        np.zeros((2, N_ROWS)),
         np.zeros(1),
     )
 
@@ -235,11 +241,30 @@ def is_regular(region: CellParameters, n: int, work: ParallelRows) -> bool:
     work.side[0] = float(sign_of_square(matrix, N_ROWS)) * region.signs[1]
     if work.side[0] <= 0.0:
         return False
+    put_bounds_of_deviation(n, work)
+    return has_weights(work)
+
+
+@routine
+def has_weights(work: ParallelRows) -> bool:
+    """True if N w < w for a positive w: it begins with ones, and N turns it towards the largest eigenvector."""
+    weights, bounds = work.weights, work.bounds
     for j in range(N_ROWS):
-        total = deviation_of_row(j, n, work)
-        if not total < 1.0:
+        weights[0, j] = 1.0
+    for _ in range(TRIALS):
+        largest, most = 0.0, 0.0
+        for j in range(N_ROWS):
+            weights[1, j] = 0.0
+            for c in range(N_ROWS):
+                weights[1, j] += bounds[j, c] * weights[0, c]
+            largest, most = max(largest, weights[1, j] / weights[0, j]), max(most, weights[1, j])
+        if largest < 1.0 - ROUNDING:
+            return True
+        if not most < math.inf:
             return False
-    return True
+        for j in range(N_ROWS):
+            weights[0, j] = max(weights[1, j] / most, LEAST_WEIGHT)
+    return False
 
 
 @routine
@@ -251,23 +276,24 @@ def put_middle(work: ParallelRows) -> None:
 
 
 @routine
-def deviation_of_row(j: int, n: int, work: ParallelRows) -> float:
-    """The most that the entries in row `j` of J^-1 times the matrix of a pose, less those of 1, sum up to in size."""
-    inverse, total, size = work.inverse, 0.0, 0.0
-    for c in range(N_ROWS):
-        part = -1.0 if c == j else 0.0
-        for k in range(N_ROWS):
-            entry = work.forces[k, CENTRE, c] if c < 3 else work.moments[k, CENTRE, c - 3]
-            error = work.forces[k, BOUNDS, ERROR] if c < 3 else work.moments[k, BOUNDS, ERROR]
-            part += inverse[j, k] * entry
-            total += abs(inverse[j, k]) * error
-            size += abs(inverse[j, k] * entry)
-        total += abs(part)
-        for i in range(n):
-            part = 0.0
+def put_bounds_of_deviation(n: int, work: ParallelRows) -> None:
+    """Fill N, which bounds the entries of J^-1 times the matrix of a pose, less those of 1."""
+    inverse = work.inverse
+    for j in range(N_ROWS):
+        for c in range(N_ROWS):
+            part, total, size = -1.0 if c == j else 0.0, 0.0, 0.0
             for k in range(N_ROWS):
-                entry = work.forces[k, i, c] if c < 3 else work.moments[k, i, c - 3]
+                entry = work.forces[k, CENTRE, c] if c < 3 else work.moments[k, CENTRE, c - 3]
+                error = work.forces[k, BOUNDS, ERROR] if c < 3 else work.moments[k, BOUNDS, ERROR]
                 part += inverse[j, k] * entry
+                total += abs(inverse[j, k]) * error
                 size += abs(inverse[j, k] * entry)
             total += abs(part)
-    return (total + ROUNDING * size) * (1.0 + ROUNDING)
+            for i in range(n):
+                part = 0.0
+                for k in range(N_ROWS):
+                    entry = work.forces[k, i, c] if c < 3 else work.moments[k, i, c - 3]
+                    part += inverse[j, k] * entry
+                    size += abs(inverse[j, k] * entry)
+                total += abs(part)
+            work.bounds[j, c] = (total + ROUNDING * size) * (1.0 + ROUNDING)
