@@ -103,7 +103,7 @@ class Choice:
         """The words of the command that makes a mechanism of it; none where there is no end effector."""
         if self.feet and self.end_effector:
             feet = (foot if touch == "point" else f"{foot}:{touch}" for foot, touch in self.feet.items())
-            return ["--stand", ",".join(feet), "--end-effector", self.end_effector]
+            return ["--stand", ",".join(feet), "--body", self.end_effector]
         drives = ["--actuated", ",".join(self.actuated)] if self.actuated else []
         return ["--base", self.base, "--end-effector", self.end_effector, *drives] if self.end_effector else []
 
