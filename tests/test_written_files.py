@@ -24,7 +24,15 @@ pytest.importorskip("matplotlib")
 pytestmark = pytest.mark.usefixtures("folder")
 
 READ = {
-    *("certify --track", "design --track", "view --track", "import --loops", "verify --loops", "verify --original"),
+    *(
+        "certify --track",
+        "design --track",
+        "view --track",
+        "import --loops",
+        "track --qpos",
+        "verify --loops",
+        "verify --original",
+    ),
 }
 """Options with files that are read."""
 
@@ -47,6 +55,7 @@ LINES = (
     "plot g1_ankle --torque-map --dpi 40 -o picture.png",
     "view five_bar --html page.html",
     "import robot.xml --end-effector p3 -o imported.toml",
+    "join five_bar rrr --prefix a_ --prefix b_ --end-effector b_platform -o joined.toml",
     "export linear_delta klipper -o a.cfg",
     "export five_bar --torch a.py --jax b.py --numpy c.py --web page.html",
 )
