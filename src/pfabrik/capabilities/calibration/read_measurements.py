@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from os import PathLike
@@ -14,7 +15,7 @@ from ...answers.status import Status
 from ...common.arguments import array
 from ...common.arrays import Floats
 from ...common.checks import require_path
-from ...common.csv_columns import CsvColumns
+from ...common.csv_columns import SEPARATORS, CsvColumns
 from ...common.text_lines import WrongText, as_text, lines_of, refusing
 from ...errors import InvalidArgument, near_miss
 from ...ik import solve_ik
@@ -183,8 +184,10 @@ def _columns(path: Path) -> dict[str, Floats]:
 def _refuse_log(path: Path, mechanism: Mechanism, error: InvalidArgument) -> None:
     """Refuse a file whose first line is no header of measurements: a log, in which no probe wrote a line."""
     with _reading(path, "a CSV file of measurements") as text:
-        first = next((line for line in lines_of(text, MOST_ROWS, "a table") if line.strip()), "")
-    names = {cell.strip().removeprefix(TARGET).removesuffix("_deg").removesuffix("_rad") for cell in first.split(",")}
+        rows = (line.strip() for line in lines_of(text, MOST_ROWS, "a table"))
+        first = next((row for row in rows if row and not row.startswith("#")), "")
+    cells = (cell.strip() for cell in re.split("|".join(SEPARATORS), first))
+    names = {cell.removeprefix(TARGET).removesuffix("_deg").removesuffix("_rad") for cell in cells}
     if not names & {*mechanism.coordinates_by_name, *POSITION, *ANGLES, *QUATERNION, HEIGHT, DISTANCE}:
         found = "no line that a probe wrote, and no column of measurements in the first line"
         expected = (
