@@ -36,7 +36,7 @@ SEARCHES = {
 """What visitors search for, and the page that has to be the first answer, if the site has it."""
 PAGES = ("index.html", "gallery.html", LIVE, "teach.html", "map.html")
 SCREENS = {"desk": {"width": 1280, "height": 800}, "phone": {"width": 390, "height": 844}}
-HEAVIEST = 420_000  # bytes that a page transfers, with all that it needs: a good second at 3 Mbit/s
+HEAVIEST = 460_000  # bytes that a page transfers, with all that it needs: a good second at 3 Mbit/s
 PATIENCE = 60_000  # milliseconds
 SETTLING = 800  # milliseconds, until what slides and fades is at rest
 TYPING, SEARCHING = 60, 1500  # milliseconds of a letter, and until answers are there
