@@ -30,10 +30,11 @@ print(f"{counts.platform} freedoms of {counts.actuators} drives, {counts.redunda
 #
 # ## Where may the box go?
 #
-# The box is the end effector: targets are its poses, and what stops it are the joints of either arm.
+# The box is the end effector: targets are its poses, and `reason` names the joint of either arm that stops it.
 tilted = pf.solve_ik(machine, pf.pose([500.0, 40.0, 420.0], rpy=[0, 0, 20], degrees=True))
 print(tilted.status.name, "with all loops closed:", bool(np.max(pf.closure_residual(tilted)) < 1e-9))
-print(pf.solve_ik(machine, pf.pose([450.0, 0.0, 1300.0])).reason)
+high = pf.solve_ik(machine, pf.pose([450.0, 0.0, 1300.0]))
+print(high.status.name, f"{high.position_error:.0f} mm off")
 
 # Each arm alone, asked with the joints of the answer, has its hand where the box is held:
 place = [machine.actuator_names.index(f"left_{name}") for name in arm.actuator_names]
