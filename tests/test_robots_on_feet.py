@@ -440,6 +440,18 @@ def test_hands_hold_a_box_where_each_arm_alone_puts_them() -> None:
         np.testing.assert_allclose(hands, answers.pose @ grips[side], atol=1e-8)
 
 
+def test_two_arms_go_with_a_stream_that_they_reach() -> None:
+    """Live, arms that begin where a target is stay within a thousandth of their size of a stream within reach."""
+    arm = pf.load("panda")
+    hands = {"left": (arm.at((0.0, 300.0, 0.0)), "flat"), "right": (arm.at((0.0, -300.0, 0.0)), "flat")}
+    machine, time = pf.grasp("box", hands), np.arange(0.0, 1.0, 0.01)  # type: ignore[arg-type]
+    shift = np.stack([20 * np.sin(2 * time), 30 * np.sin(3 * time), 40 * np.sin(4 * time)], axis=1)
+    targets = pf.pose(machine.home_pose[:3, 3] + shift)
+    driven = pf.Live(machine, speed=2.0).follow(targets, sample_time=0.01)
+    assert np.linalg.norm((driven.pose - targets)[:, :3, 3], axis=1).max() < 1e-3 * machine.characteristic_length
+    assert np.abs(driven.speeds).max() <= 2.0 * (1.0 + 1e-9)
+
+
 def test_fingers_touch_at_points() -> None:
     """Arms as they are at home, touching at points of the hand: the object turns about what it is held at."""
     arm = pf.load("panda")

@@ -195,8 +195,10 @@ def price_curvature(objective: PoseObjective, majorises: bool, gradient: PoseGra
 
 @routine
 def is_on_edge(objective: PoseObjective, gradient: PoseGradient) -> bool:
-    """True if a descent by a price ends where it is, for what is held is all but held."""
+    """True if a descent by a price ends where it is, for what is held is all but held; never without a share of it."""
     pricing, weight = gradient.pricing[0], 1.0
+    if not pricing["edge"] > 0.0:
+        return False
     held, square = pricing["place"], pricing["place"] + pricing["turn"]
     if objective.hold == HOLD_ORIENTATION:
         weight = max(objective.platform[3], max(objective.platform[4], objective.platform[5]))
